@@ -51,10 +51,11 @@ void put(cJSON *json, const char *name, double value, const char *unit, double c
 }
 
 /* gain: of the inputs of D1 and C1. At 1 some 8 and 16 % of them fire, at 4 some 36 and 39 %, as in trained nets. */
-static sf_model full_model(sf_net_kind net, int steps, float gain)
+static sf_model full_model(sf_net_kind net, sf_input_mode mode, int steps, float gain)
 {
   sf_config c = sf_config_default();
   c.net = net;
+  c.mode = mode;
   c.steps = steps;
   sf_model m;
   if (sf_model_create(&m, &c).code) exit(1);
@@ -65,7 +66,7 @@ static sf_model full_model(sf_net_kind net, int steps, float gain)
   return m;
 }
 
-/* Samples per second of all threads over `seconds`. */
+/* Samples per second of all threads over `seconds`. In radix mode of the last prefix, as in most iterations. */
 static double nets(const sf_kernels *k, const sf_model *m, bool with_backward, double seconds)
 {
   double total = 0;
@@ -83,6 +84,7 @@ static double nets(const sf_kernels *k, const sf_model *m, bool with_backward, d
     for (int i = 0; i < 32 * SF_BLOCK; i++) b->f[i] = test_random(i);
     for (int i = 0; i < 16 * SF_BLOCK; i++) b->sh[i] = test_random(99999 + i);
     for (int i = 0; i < SF_T_MAX * 3 * SF_BLOCK; i++) dc[i] = 1e-3f * test_random(5000 + i);
+    b->from = steps - 1;
     double start = sf_seconds(), now = start;
     long blocks = 0;
     for (; now - start < seconds; now = sf_seconds(), blocks += 8)
@@ -119,16 +121,17 @@ static void bench_nets(cJSON *json, const ceilings *c)
   static const struct {
     const char *name;
     sf_net_kind net;
+    sf_input_mode mode;
     int steps;
     float gain;
-  } cases[] = {{"t8", SF_NET_SNN, 8, 1},
-               {"t8.busy", SF_NET_SNN, 8, 4},
-               {"t3", SF_NET_SNN, 3, 1},
-               {"t1", SF_NET_SNN, 1, 1},
-               {"ann", SF_NET_ANN, 1, 1}};
+  } cases[] = {{"t8", SF_NET_SNN, SF_HYBRID, 8, 1},      {"t8.busy", SF_NET_SNN, SF_HYBRID, 8, 4},
+               {"t3", SF_NET_SNN, SF_HYBRID, 3, 1},      {"t1", SF_NET_SNN, SF_HYBRID, 1, 1},
+               {"t8.radix", SF_NET_SNN, SF_RADIX, 8, 1}, {"t3.radix", SF_NET_SNN, SF_RADIX, 3, 1},
+               {"ann", SF_NET_ANN, SF_HYBRID, 1, 1}};
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
-    sf_model m = full_model(cases[i].net, cases[i].steps, cases[i].gain);
-    const double most = c->fma / operations(cases[i].steps);
+    sf_model m = full_model(cases[i].net, cases[i].mode, cases[i].steps, cases[i].gain);
+    const int products = cases[i].mode == SF_RADIX ? 1 : cases[i].steps; /* of a layer that waits: one */
+    const double most = c->fma / operations(products);
     char name[64];
     snprintf(name, sizeof name, "train.nets.fwd.%s", cases[i].name);
     put(json, name, nets(best, &m, false, 1), "samples/s", most, naive_forward(&m));
@@ -177,7 +180,7 @@ static double naive_grid(const grid_rig *r)
 static void bench_grid(cJSON *json, const ceilings *c)
 {
   const sf_kernels *k = sf_kernels_training(), *portable = sf_kernels_select("portable");
-  grid_rig r = {.model = full_model(SF_NET_SNN, 8, 1),
+  grid_rig r = {.model = full_model(SF_NET_SNN, SF_HYBRID, 8, 1),
                 .x = sf_aligned_alloc(GRID_BLOCKS * 3 * SF_BLOCK * sizeof(float)),
                 .f = sf_aligned_alloc(GRID_BLOCKS * 32 * SF_BLOCK * sizeof(float))};
   r.grad = sf_aligned_alloc(r.model.size * sizeof(float));
@@ -203,7 +206,7 @@ static void naive_adam(size_t n, float *value, const float *g, float *m, float *
 
 static void bench_adam(cJSON *json, const ceilings *c)
 {
-  sf_model m = full_model(SF_NET_SNN, 8, 1);
+  sf_model m = full_model(SF_NET_SNN, SF_HYBRID, 8, 1);
   float *g = sf_aligned_alloc(m.size * 4), *a = sf_aligned_alloc(m.size * 4), *v = sf_aligned_alloc(m.size * 4);
   const sf_kernels *kernels = sf_kernels_training();
   sf_adam adam = {1e-2, 0.9, 0.99, 1e-15, 1, 0};

@@ -65,7 +65,7 @@ every_tool() { # SCENE DATA TRAIN-OPTIONS...
   tool "$s" fine-tune "$bin/sf_train" "$d" -o tuned.safetensors --fine-tune "$s.safetensors" --weight-bits 6 --stage2 5 --eval-views 1 --quiet
   tool "$s" vectors "$bin/sf_export" "$s.snn" --vectors "$s.kit" --data "$d" --samples 4
   tool "$s" traces "$bin/sf_export" "$s.snn" --traces "$s.traces" --data "$d" --rays 2
-  "$bin/sf_export" "$s.snn" --nir "$s.nir" >/dev/null 2>err.txt && fail "$s, nir: weighted spikes as a NIR graph"
+  "$bin/sf_export" "$s.snn" --nir "$s.nir" >/dev/null 2>err.txt && fail "$s, nir: mode radix as a NIR graph"
   grep -q "input-mode hybrid" err.txt || fail "$s, nir: $(cat err.txt)"
   "$bin/sf_train" "$d" -o leaky.safetensors --input-mode hybrid --stage1 2 --stage2 2 --steps 2 --hidden 32 --occ-res 16 --eval-views 1 \
     --quiet "$@" >/dev/null || fail "$s: training of leaky neurons"

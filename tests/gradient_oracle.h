@@ -71,14 +71,14 @@ static inline dual leak(const oracle *o, int layer)
 
 /* ---- the nets ---- */
 
-/* Of a membrane, or an integrator whose steps weigh the same. */
+/* Of a membrane, or an integrator. In radix mode it takes its current once, and doubles what is left. */
 static inline dual charged_by(const oracle *o, int step, dual k, dual before, dual in)
 {
   const sf_config *c = &o->t->model.config;
   if (c->net == SF_NET_ANN) return in;
   switch (c->mode) {
   case SF_RADIX:
-    return 2 * before + in;
+    return step ? 2 * before : in;
   case SF_NODECAY:
     return (1 - k) * before + in;
   case SF_HYBRID:
@@ -90,7 +90,6 @@ static inline dual charged_by(const oracle *o, int step, dual k, dual before, du
 
 typedef struct oracle_layer {
   dual v[SF_LANES], silent[SF_LANES]; /* product over the steps of 1 - s: 1 where it never fired */
-  dual sum[3];                        /* of weighted spikes: what the outputs behind it have integrated */
 } oracle_layer;
 
 static inline void oracle_fire(const oracle *o, int spiking, int step, dual k, const dual *current, oracle_layer *l,
@@ -101,20 +100,9 @@ static inline void oracle_fire(const oracle *o, int spiking, int step, dual k, c
     const dual h = charged_by(o, step, k, step ? l->v[n] : 0, current[n]);
     s[n] = c->net == SF_NET_ANN ? positive(h) : spike(h - c->theta[spiking]);
     if (o->nearest) *o->nearest = fmin(*o->nearest, fabs(creal(h) - (double)c->theta[spiking]));
-    l->v[n] = h - s[n] * (c->mode == SF_RADIX ? 2 : 1) * c->theta[spiking];
+    l->v[n] = h - s[n] * c->theta[spiking];
     l->silent[n] = (step ? l->silent[n] : 1) * (1 - s[n]);
   }
-}
-
-/* Output `at` of a layer at one step: activations are integrated, or of weighted spikes currents, whose steps weigh
- * half of the one before. */
-static inline dual oracle_read(const oracle *o, int step, dual k, dual (*activation)(dual), dual current, dual before,
-                               dual *sum)
-{
-  const sf_config *c = &o->t->model.config;
-  if (c->mode != SF_RADIX || c->net == SF_NET_ANN) return charged_by(o, step, k, before, activation(current));
-  *sum = ((step ? *sum : 0) * (pow(2, step + 1) - 2) + current) / (pow(2, step + 1) - 1);
-  return activation(*sum);
 }
 
 /* out[rows] += matrix `id`, from input `first` on, times in[n]. */
@@ -152,27 +140,78 @@ static inline void oracle_colour(const oracle *o, int step, const dual *current,
   oracle_bias(o, SF_P_C3_BIAS, j);
   for (int a = 0; a < 3; a++)
     colour[a] = along ? logistic(j[a])
-                      : oracle_read(o, step, leak(o, 4), logistic, j[a], step ? before[a] : 0, &layer[2].sum[a]);
+                      : charged_by(o, step, leak(o, 4), step ? before[a] : 0, logistic(j[a]));
+}
+
+static inline bool oracle_waits(const oracle *o)
+{
+  return o->t->model.config.mode == SF_RADIX && o->t->model.config.net == SF_NET_SNN;
+}
+
+static inline dual rounded_h(const oracle *o, int digits, dual h)
+{
+  const double step = sf_scales_h_step(&o->t->model.scales);
+  if (!(step > 0)) return h;
+  return with_slope(step * floor(creal(h) / step + 0.5 / (1 << (SF_H_SHIFT + digits))), 1, h);
+}
+
+/* Radix mode: out[rows] = what matrix `id` makes of all spikes of a layer, and of a bias, SF_P_COUNT for none. */
+static inline void oracle_wait(const oracle *o, int spiking, int steps, const dual *current, oracle_layer *l, int id,
+                               int bias, dual *out)
+{
+  dual s[SF_LANES], worth[SF_LANES] = {0};
+  for (int t = 0; t < steps; t++) {
+    oracle_fire(o, spiking, t, 0, current, l, s);
+    for (int n = 0; n < o->t->model.config.hidden; n++) worth[n] += s[n] * pow(0.5, t + 1);
+  }
+  if (bias < SF_P_COUNT) oracle_bias(o, bias, out);
+  for (int64_t r = 0; r < o->t->model.param[id].shape[0]; r++) out[r] *= 1 - pow(0.5, steps);
+  oracle_multiply(o, id, 0, o->t->model.config.hidden, worth, out);
+}
+
+/* Radix mode: C1 to the colour of a prefix. */
+static inline void oracle_colour_prefix(const oracle *o, int steps, const dual *current, oracle_layer layer[3],
+                                        dual colour[3])
+{
+  dual current2[SF_LANES] = {0}, j[3] = {0};
+  oracle_wait(o, 1, steps, current, &layer[1], SF_P_C2, SF_P_C2_BIAS, current2);
+  oracle_wait(o, 2, steps, current2, &layer[2], SF_P_C3, SF_P_C3_BIAS, j);
+  for (int a = 0; a < 3; a++) colour[a] = logistic(j[a]);
+}
+
+/* Radix mode: every prefix is a pass of its own, and the last one is charged. */
+static inline void oracle_prefixes(const oracle *o, const dual *current, const dual *constant, oracle_layer layer[3],
+                                   oracle_ray *ray, int at)
+{
+  for (int p = 0; p < o->plan->steps; p++) {
+    dual i[SF_DENSITY_OUT] = {0}, current1[SF_LANES];
+    if (p < sf_loss_from(o->plan)) continue;
+    oracle_wait(o, 0, p + 1, current, &layer[0], SF_P_D2, SF_P_COUNT, i);
+    ray->sigma[p][at] = cexp(i[0]);
+    memcpy(current1, constant, sizeof current1);
+    for (int a = 1; a < SF_DENSITY_OUT; a++) i[a] = rounded_h(o, p + 1, i[a]);
+    oracle_multiply(o, SF_P_C1, SF_DIR_FEATURES, SF_GEO_FEATURES, i + 1, current1);
+    oracle_colour_prefix(o, p + 1, current1, layer, ray->colour[p][at]);
+  }
 }
 
 /* Density and colour nets of one sample, all steps; what its firing is charged with. */
 static inline dual oracle_nets(const oracle *o, const dual *feature, const float *sh, oracle_ray *ray, int at)
 {
   const sf_model *m = &o->t->model;
-  const double h_step = sf_scales_h_step(&m->scales);
   oracle_layer layer[3];
   dual current[SF_LANES] = {0}, constant[SF_LANES] = {0}, direction[SF_DIR_FEATURES], s[SF_LANES];
   for (int i = 0; i < SF_DIR_FEATURES; i++) direction[i] = sh[i];
   oracle_multiply(o, SF_P_D1, 0, 2 * m->config.levels, feature, current);
   oracle_multiply(o, SF_P_C1, 0, SF_DIR_FEATURES, direction, constant);
-  for (int t = 0; t < o->plan->steps; t++) {
+  if (oracle_waits(o)) oracle_prefixes(o, current, constant, layer, ray, at);
+  for (int t = 0; t < o->plan->steps && !oracle_waits(o); t++) {
     dual i[SF_DENSITY_OUT] = {0}, current1[SF_LANES];
     oracle_fire(o, 0, t, leak(o, 0), current, &layer[0], s);
     oracle_multiply(o, SF_P_D2, 0, m->config.hidden, s, i);
-    ray->sigma[t][at] = oracle_read(o, t, leak(o, 1), cexp, i[0], t ? ray->sigma[t - 1][at] : 0, &layer[0].sum[0]);
+    ray->sigma[t][at] = charged_by(o, t, leak(o, 1), t ? ray->sigma[t - 1][at] : 0, cexp(i[0]));
     memcpy(current1, constant, sizeof current1);
-    for (int a = 1; a < SF_DENSITY_OUT && h_step > 0; a++)
-      i[a] = with_slope(h_step * floor(creal(i[a]) / h_step + 0.5 / (1 << SF_H_SHIFT)), 1, i[a]);
+    for (int a = 1; a < SF_DENSITY_OUT; a++) i[a] = rounded_h(o, 0, i[a]);
     oracle_multiply(o, SF_P_C1, SF_DIR_FEATURES, SF_GEO_FEATURES, i + 1, current1);
     oracle_colour(o, t, current1, layer, t ? ray->colour[t - 1][at] : NULL, ray->colour[t][at]);
   }
@@ -212,7 +251,9 @@ static inline dual oracle_decoder(const oracle *o, const dual *in, oracle_ray *r
   dual current[SF_LANES] = {0};
   oracle_multiply(o, SF_P_C1, 0, sf_tensorf_inputs(&o->t->model.config.tensorf), in, current);
   oracle_bias(o, SF_P_C1_BIAS, current);
-  for (int t = 0; t < o->plan->steps; t++)
+  for (int p = 0; p < o->plan->steps && oracle_waits(o); p++)
+    if (p >= sf_loss_from(o->plan)) oracle_colour_prefix(o, p + 1, current, layer, ray->colour[p][at]);
+  for (int t = 0; t < o->plan->steps && !oracle_waits(o); t++)
     oracle_colour(o, t, current, layer, t ? ray->colour[t - 1][at] : NULL, ray->colour[t][at]);
   return oracle_charge(o, layer, 1);
 }

@@ -42,7 +42,7 @@ enum { SIZE = 40 };
 
 /* Hash grids in each input mode; TensoRF around an object, in a box of bound 4, and in NDC; the first of them with
  * settled scales, as fine-tuning leaves it. */
-enum { GRIDS = 3, OBJECT = GRIDS, LARGE_BOX, FORWARD, TUNED, CASES };
+enum { GRIDS = 4, OBJECT = GRIDS, LARGE_BOX, FORWARD, TUNED, CASES };
 
 static void settle(sf_model *m)
 {
@@ -66,7 +66,7 @@ static sf_model make_model(int kind)
   sf_model m = test_smooth_tensorf(kind == FORWARD);
   sf_tensorf *t = &m.config.tensorf;
   t->weight_stop = 0.0005;
-  m.config.mode = kind == TUNED ? SF_HYBRID : (sf_input_mode)(kind - OBJECT);
+  m.config.mode = kind == TUNED ? SF_RADIX : (sf_input_mode)(kind - OBJECT);
   for (int i = 0; i < 3 && kind == LARGE_BOX; i++) t->box[0][i] = -4, t->box[1][i] = 4;
   if (kind == TUNED) settle(&m);
   if (kind == LARGE_BOX) t->near = (float)SF_NEAR, t->far = 1e6f, t->distance_scale = 1.5f;

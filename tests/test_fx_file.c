@@ -169,6 +169,18 @@ TEST(metadata_is_checked)
   for (int i = 0; i < COUNT(wrong); i++) assert_edit_refused(&scene, wrong[i]);
 }
 
+/* The mode of that name was another neuron. */
+TEST(scenes_of_weighted_spikes_are_refused)
+{
+  OWNED(fx_scene) scene = small_scene(4);
+  fx_scene loaded;
+  save(&scene);
+  edit("mode", "weighted");
+  const sf_status status = fx_scene_load(&loaded, path);
+  ck_assert_int_eq(status.code, SF_E_UNSUPPORTED);
+  ck_assert_ptr_nonnull(strstr(status.message, "train the model anew"));
+}
+
 TEST(thresholds_of_radix_end_earlier)
 {
   OWNED(fx_scene) scene = small_scene(5);

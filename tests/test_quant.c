@@ -113,7 +113,9 @@ static void add_currents(tally *sum, const fx_scene *scene, const fx_trace *fixe
 {
   for (int l = 0; l < SF_LAYERS; l++)
     for (int o = 0; o < scene->net.layer[l].n_out; o++) {
-      const double exact = real->current[l][t][o], d = fixed->current[l][t][o] * scene->units.current_scale[l] - exact;
+      const int digits = l == FX_C2 && scene->net.mode == FX_RADIX ? scene->net.steps : 0; /* one of all steps */
+      const double exact = real->current[l][t][o];
+      const double d = ldexp(fixed->current[l][t][o] * scene->units.current_scale[l], -digits) - exact;
       sum->current_error[l] += d * d, sum->current_energy[l] += exact * exact;
     }
 }
@@ -200,16 +202,16 @@ static double colour_error(const sf_model *m, const fx_scene *scene)
     draw(sample, pos, x, sh);
     sf_grid_features(m, x, f);
     sf_net_sample(m, f, sh, scene->net.steps, sigma, colour, real);
-    double exact[3] = {0}, found[3] = {0}, weights = 0;
+    double exact[3] = {0}, found[3] = {0};
+    const double weights = behind ? 1 : scene->net.steps;
     for (int t = 0; t < scene->net.steps; t++) {
-      weights += behind ? ldexp(1, -t) : 1;
       for (int o = 0; o < 3; o++) {
         int current = 0;
         for (int i = 0; i < m->config.hidden; i++)
           current += real->spike[FX_C2][t][i] ? scene->net.layer[FX_C3].w[i * SF_LANES + o] : 0;
         const double j[2] = {real->current[FX_C3][t][o], current * scene->units.current_scale[FX_C3]};
-        exact[o] += behind ? ldexp(j[0], -t) : 1 / (1 + exp(-j[0]));
-        found[o] += behind ? ldexp(j[1], -t) : 1 / (1 + exp(-j[1]));
+        exact[o] += behind ? ldexp(j[0], -t - 1) : 1 / (1 + exp(-j[0]));
+        found[o] += behind ? ldexp(j[1], -t - 1) : 1 / (1 + exp(-j[1]));
       }
     }
     for (int o = 0; o < 3; o++) {
@@ -231,7 +233,7 @@ LOOP_TEST(one_large_weight_does_not_coarsen_the_others, 2)
   for (int i = 0; i < 2; i++) {
     OWNED(fx_scene) scene;
     sf_quant_report report;
-    *large = i ? (_i ? -200 : -20) : *large; /* the last digit of a weighted spike counts little */
+    *large = i ? (_i ? -200 : -20) : *large; /* the last digit counts little */
     quantise(&m, &scene, &report);
     error[i] = colour_error(&m, &scene);
     unit[i] = report.layer[FX_C3].unit;
@@ -354,7 +356,7 @@ TEST(where_rays_end)
   ck_bad(sf_config_check(&m.config), SF_E_RANGE, "stop", "outside 1e-06..0.05");
 }
 
-/* Weights so small that theta is at the end of its range: of weighted spikes half of that of the others. */
+/* Weights so small that theta is at the end of its range: of radix half of that of the others. */
 TEST(largest_thresholds)
 {
   for (int mode = SF_HYBRID; mode <= SF_RADIX; mode++) {

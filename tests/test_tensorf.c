@@ -132,5 +132,22 @@ TEST(save_and_load)
   }
 }
 
+/* Files of version 1 are read, but for those of weighted neurons, which had the number that radix neurons have now. */
+LOOP_TEST(files_of_the_version_before, 3)
+{
+  const bool twin = _i == 2;
+  OWNED(sf_model) m = test_tensorf(twin ? SF_NET_ANN : SF_NET_SNN, 0, 32, twin ? 1 : 4), back = {0};
+  OWNED(sf_tensors) set = {0};
+  m.config.mode = _i ? SF_RADIX : SF_HYBRID;
+  ck_ok(sf_model_save(&m, in("model.safetensors")));
+  ck_ok(sf_tensors_load(&set, in("model.safetensors")));
+  ck_assert_str_eq(sf_tensors_meta(&set, "version"), "2");
+  cJSON_ReplaceItemInObjectCaseSensitive(set.metadata, "version", cJSON_CreateString("1"));
+  ck_ok(sf_tensors_save(set.tensor, set.count, set.metadata, in("before.safetensors")));
+  const sf_status status = sf_model_load(&back, in("before.safetensors"));
+  ck_assert_int_eq(status.code, _i == 1 ? SF_E_UNSUPPORTED : SF_OK);
+  if (_i == 1) ck_assert_ptr_nonnull(strstr(status.message, "train the model anew"));
+}
+
 int ck_timeout = 120;
 ck_options ck_program = {.set_up = make_folder, .tear_down = remove_folder};

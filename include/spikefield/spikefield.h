@@ -100,8 +100,7 @@ SPIKEFIELD_API void spikefield_scene_close(spikefield_scene *scene);
 typedef enum { SPIKEFIELD_HYBRID, SPIKEFIELD_DECAY, SPIKEFIELD_NO_DECAY, SPIKEFIELD_RADIX } spikefield_mode;
 typedef struct spikefield_scene_info {
   int32_t inputs[SPIKEFIELD_LAYERS], outputs[SPIKEFIELD_LAYERS]; /* of each layer */
-  int32_t theta[SPIKEFIELD_LAYERS];                              /* thresholds in membrane LSB; 0 in D2 and C3.
-                                                                    Weighted spikes fire at twice that, and lose it */
+  int32_t theta[SPIKEFIELD_LAYERS];                              /* thresholds in membrane LSB; 0 in D2 and C3 */
   int32_t leak_q12[SPIKEFIELD_LAYERS];
   spikefield_mode mode;
   int32_t steps;         /* time steps the scene asks for */
@@ -170,10 +169,11 @@ typedef struct spikefield_sample {
 typedef struct spikefield_trace {
   /* D1, C1, C2: neuron n is bit n % 64 of word n / 64. */
   uint64_t spikes[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES / 64];
-  /* D1, C1, C2: before firing and reset; D2 [0], C3 [0..2]: the accumulator after the step. Of weighted spikes a
-   * membrane has theta in it, and the accumulator is the sum of currents. */
+  /* D1, C1, C2: before firing and reset; D2 [0], C3 [0..2]: the accumulator after the step, of radix the sum of
+   * currents, each step's weighing half of the one before. */
   int32_t membrane[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES];
-  int32_t current[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES]; /* exact sums */
+  int32_t current[SPIKEFIELD_LAYERS][SPIKEFIELD_STEPS_MAX][SPIKEFIELD_LANES]; /* exact sums;
+                                                                                 of radix in C2 that of all steps */
 } spikefield_trace;
 
 /* What the accelerator shows of a sample at a layer and step: its ports tap_*, bits as in a trace. Neurons that the

@@ -110,7 +110,7 @@ void sf_exact_close(sf_exact *e)
 
 /* ---- nets ---- */
 
-/* fx_plif_step and fx_integrate_* of spikes that weigh the same: the same equation, rounded or not. */
+/* fx_plif_step and fx_integrate_* of the modes that do not double: the same equation, rounded or not. */
 static double charge(const sf_exact *e, double v, double in, double k, int t, bool exact)
 {
   if (t == 0 && e->scene->net.mode == FX_HYBRID) return in;
@@ -130,14 +130,13 @@ static double to_membrane(double x)
 
 static void fire(const sf_exact *e, int l, int t, double *v, const double *current, sf_exact_out *out)
 {
-  const bool exact = sf_exact_is(e, SF_EXACT_MEMBRANE), weighted = e->scene->net.mode == FX_RADIX;
-  const double theta = e->theta[l], quantum = weighted ? 2 * theta : theta;
+  const bool exact = sf_exact_is(e, SF_EXACT_MEMBRANE), radix = e->scene->net.mode == FX_RADIX;
   for (int o = 0; o < e->scene->net.layer[l].n_out; o++) {
     const double in = ldexp(current[o], fx_layer_frac(l, e->scene->net.mode)), held = exact ? in : to_membrane(in);
-    const double u = weighted ? 2 * (t ? v[o] : theta) + held - theta : charge(e, v[o], held, e->k[l], t, exact);
+    const double u = radix ? (t ? 2 * v[o] : held) : charge(e, v[o], held, e->k[l], t, exact);
     const double kept = exact ? u : to_membrane(u);
-    const bool spike = kept >= quantum;
-    v[o] = kept - (spike ? quantum : 0);
+    const bool spike = kept >= e->theta[l];
+    v[o] = kept - (spike ? e->theta[l] : 0);
     out->spikes[l][t][o / 64] |= (uint64_t)spike << o % 64;
   }
 }
@@ -168,11 +167,11 @@ static double table_argument(double current, const fx_scale *scale, int bits)
   return sf_exact_clamp(sf_exact_round(ldexp(current * scale->mul, -scale->shift)) + scale->bias, -high, high - 1);
 }
 
-/* What one LSB of a table's current is worth: weighted steps sum to 2^T - 1 of them. */
+/* What one LSB of a table's current is worth: radix asks for the sum of all digits. */
 static double current_lsb(const sf_exact *e, int layer)
 {
   const fx_net *net = &e->scene->net;
-  return e->scene->units.current_scale[layer] / (net->mode == FX_RADIX ? (1 << net->steps) - 1 : 1);
+  return ldexp(e->scene->units.current_scale[layer], net->mode == FX_RADIX ? -net->steps : 0);
 }
 
 static double density(const sf_exact *e, double current)
@@ -207,55 +206,74 @@ void sf_exact_direction(const sf_exact *e, const double *x, double *base)
   for (int i = 0; i < n; i++) add_row(e, FX_C1, i, x[i], base);
 }
 
-/* The output so far: activations are integrated; of weighted spikes currents, and the activation comes behind. */
-static void read_density(const sf_exact *e, int t, double current, sf_exact_out *out)
-{
-  const bool weighted = e->scene->net.mode == FX_RADIX;
-  out->weighed[0] = 2 * out->weighed[0] + current;
-  if (!fx_net_reads_tables(&e->scene->net, t)) return;
-  const double value = density(e, weighted ? out->weighed[0] : current);
-  out->sigma = weighted ? value : integrate(e, out->sigma, value, FX_D2, t, SF_SIGMA_BITS);
-}
-
-static void read_colour(const sf_exact *e, int t, int o, double current, sf_exact_out *out)
-{
-  const bool weighted = e->scene->net.mode == FX_RADIX;
-  out->weighed[1 + o] = 2 * out->weighed[1 + o] + current;
-  if (!fx_net_reads_tables(&e->scene->net, t)) return;
-  const double value = colour(e, weighted ? out->weighed[1 + o] : current);
-  out->colour[o] = weighted ? value : integrate(e, out->colour[o], value, FX_C3, t, SF_COLOUR_BITS);
-}
-
-/* D1 and D2 at step t; the inputs h of C1 are added to `current`. */
-static void density_step(const sf_exact *e, int t, double *v, const double *d1, double *current, sf_exact_out *out)
+/* The inputs h of C1, of D2's currents; an LSB of h is 2^shift of them. */
+static void add_h(const sf_exact *e, const double *d2, int shift, double *current)
 {
   const fx_net *net = &e->scene->net;
-  double d2[SF_LANES];
-  fire(e, FX_D1, t, v, d1, out);
-  add_spikes(e, FX_D2, out->spikes[FX_D1][t], d2);
-  read_density(e, t, d2[0], out);
   for (int j = 0; j < fx_net_h(net); j++) {
-    const double h = ldexp(d2[1 + j], -SF_H_SHIFT);
+    const double h = ldexp(d2[1 + j], -shift);
     const bool real = sf_exact_is(e, SF_EXACT_H) && !e->model->scales.weight_bits;
     add_row(e, FX_C1, fx_net_constants(net) + j, real ? h : floor(h), current);
   }
 }
 
-void sf_exact_sample(const sf_exact *e, const double *f, const double *base, sf_exact_out *out)
+static void run_steps(const sf_exact *e, const double *d1, const double *base, sf_exact_out *out)
 {
   const fx_net *net = &e->scene->net;
-  double d1[SF_LANES] = {0}, current[SF_LANES], v[3][SF_LANES] = {{0}};
-  memset(out, 0, sizeof *out);
-  for (int i = 0; i < net->layer[FX_D1].n_in; i++) add_row(e, FX_D1, i, f[i], d1);
+  double current[SF_LANES], d2[SF_LANES], v[3][SF_LANES] = {{0}};
   for (int t = 0; t < net->steps; t++) {
     memcpy(current, base, sizeof current);
-    if (!fx_net_decodes(net)) density_step(e, t, v[0], d1, current, out);
+    if (!fx_net_decodes(net)) {
+      fire(e, FX_D1, t, v[0], d1, out);
+      add_spikes(e, FX_D2, out->spikes[FX_D1][t], d2);
+      out->sigma = integrate(e, out->sigma, density(e, d2[0]), FX_D2, t, SF_SIGMA_BITS);
+      add_h(e, d2, SF_H_SHIFT, current);
+    }
     fire(e, FX_C1, t, v[1], current, out);
     add_spikes(e, FX_C2, out->spikes[FX_C1][t], current);
     fire(e, FX_C2, t, v[2], current, out);
     add_spikes(e, FX_C3, out->spikes[FX_C2][t], current);
-    for (int o = 0; o < 3; o++) read_colour(e, t, o, current[o], out);
+    for (int o = 0; o < 3; o++)
+      out->colour[o] = integrate(e, out->colour[o], colour(e, current[o]), FX_C3, t, SF_COLOUR_BITS);
   }
+}
+
+/* ---- radix: a layer begins when all steps of the one before are there ---- */
+
+/* The spikes that a layer's currents make, and what the next layer makes of them: sum[o], in 2^-steps of its LSB. */
+static void run_layer(const sf_exact *e, int l, const double *current, double *sum, sf_exact_out *out)
+{
+  double step[SF_LANES], v[SF_LANES] = {0};
+  memset(sum, 0, SF_LANES * sizeof *sum);
+  for (int t = 0; t < e->scene->net.steps; t++) {
+    fire(e, l, t, v, current, out);
+    add_spikes(e, l + 1, out->spikes[l][t], step);
+    for (int o = 0; o < e->scene->net.layer[l + 1].n_out; o++) sum[o] = 2 * sum[o] + step[o];
+  }
+}
+
+static void run_layers(const sf_exact *e, const double *d1, const double *base, sf_exact_out *out)
+{
+  const fx_net *net = &e->scene->net;
+  double current[SF_LANES], sum[SF_LANES];
+  memcpy(current, base, sizeof current);
+  if (!fx_net_decodes(net)) {
+    run_layer(e, FX_D1, d1, sum, out);
+    out->sigma = density(e, sum[0]);
+    add_h(e, sum, SF_H_SHIFT + net->steps, current);
+  }
+  run_layer(e, FX_C1, current, sum, out);
+  for (int o = 0; o < SF_LANES; o++) current[o] = ldexp(sum[o], -net->steps);
+  run_layer(e, FX_C2, current, sum, out);
+  for (int o = 0; o < 3; o++) out->colour[o] = colour(e, sum[o]);
+}
+
+void sf_exact_sample(const sf_exact *e, const double *f, const double *base, sf_exact_out *out)
+{
+  double d1[SF_LANES] = {0};
+  memset(out, 0, sizeof *out);
+  for (int i = 0; i < e->scene->net.layer[FX_D1].n_in; i++) add_row(e, FX_D1, i, f[i], d1);
+  (e->scene->net.mode == FX_RADIX ? run_layers : run_steps)(e, d1, base, out);
 }
 
 double sf_exact_behind(const sf_exact *e, int32_t n, double transmittance, double sigma)

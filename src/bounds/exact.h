@@ -6,7 +6,6 @@
 
 typedef struct sf_exact_out {
   double sigma, colour[3];
-  double weighed[4]; /* of weighted spikes: currents of the density and the colours so far */
   uint64_t spikes[SF_LAYERS][SF_T_MAX][SF_SPIKE_WORDS];
 } sf_exact_out;
 

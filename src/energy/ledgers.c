@@ -70,6 +70,12 @@ static uint64_t rows_of(const fx_layer *layer, uint64_t bytes)
   return layer->n_out ? bytes / (uint64_t)layer->n_out : 0;
 }
 
+/* Updates that also read their state: all but the first one of a sample. */
+static uint64_t states_read(const fx_layer_counts *c, int t)
+{
+  return c->updates[t] ? c->state_r[t] / (c->state_w[t] / c->updates[t]) : 0;
+}
+
 static void spiking_events(const sf_counted *counted, event_table e)
 {
   memset(e, 0, sizeof(event_table));
@@ -79,7 +85,7 @@ static void spiking_events(const sf_counted *counted, event_table e)
       e[l][t][SF_PART_MAC] = c->mac[t];
       e[l][t][SF_PART_SOP] = c->sop[t];
       e[l][t][SF_PART_WEIGHT] = rows_of(&counted->scene->net.layer[l], c->weight[t]);
-      e[l][t][SF_PART_STATE] = sf_add_u64(c->updates[t], t > 0 ? c->updates[t] : 0); /* written, later also read */
+      e[l][t][SF_PART_STATE] = sf_add_u64(c->updates[t], states_read(c, t));
       e[l][t][SF_PART_NEURON] = c->updates[t];
       e[l][t][SF_PART_SPECIAL] = c->special[t];
     }

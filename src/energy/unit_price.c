@@ -91,13 +91,15 @@ static uint64_t special_fj(const pricing *p, int argument_bits, int result_bits)
          adds(p, 2, result_bits) + 2 * sf_price_access(p->tech, TABLE_ENTRIES * TABLE_ENTRY_BYTES, p->interpolated);
 }
 
-/* Difference from the membrane times the leak, added; compared with the threshold, which a spike takes off. Weighted
- * spikes have no leak: twice the membrane, the current, less the threshold. The integrators of D2 and C3 neither
+/* Difference from the membrane times the leak, added; compared with the threshold, which a spike takes off. Of
+ * radix the leak is a shift, and an update is two additions: it compares and takes off; or it adds a sum to C2's
+ * membrane, and the last of those also compares and takes off. T - 1 and T of them are 3 T - 1 additions, which 2 for
+ * each of 2 T - 1 updates are not below. The integrators of D2 and C3 neither
  * compare nor reset, and have no threshold. */
 static uint64_t neuron_fj(const pricing *p, const fx_net *net, int l)
 {
-  const int bits = fx_layer_table[l].state_bits;
-  if (net->mode == FX_RADIX) return adds(p, fx_layer_fires(l) ? 4 : 1, bits);
+  const int bits = fx_layer_state_bits(l, net->mode);
+  if (net->mode == FX_RADIX) return adds(p, fx_layer_fires(l) ? 2 : 1, bits);
   return products(p, 1, bits, K_BITS) + adds(p, fx_layer_fires(l) ? 4 : 2, bits);
 }
 
@@ -155,7 +157,7 @@ static uint64_t layer_fj(const pricing *p, const fx_net *net, int ledger, int l,
   case SF_PART_WEIGHT:
     return sf_row_accesses(layer) * sf_price_access(p->tech, sf_weights_size(layer), p->interpolated);
   case SF_PART_STATE:
-    return sf_price_register(p->tech, twin ? ACTIVATION_BITS : fx_layer_table[l].state_bits, p->interpolated);
+    return sf_price_register(p->tech, twin ? ACTIVATION_BITS : fx_layer_state_bits(l, net->mode), p->interpolated);
   case SF_PART_NEURON:
     if (twin) return products(p, 1, TWIN_SUM_BITS, REQUANTISE_BITS) + adds(p, 1, TWIN_SUM_BITS);
     return neuron_fj(p, net, l);

@@ -162,10 +162,10 @@ static void colour_part(sf_nir_graph *g, const nets *nets)
 static sf_status write_nets(const char *path, const nets *nets)
 {
   if (nets->mode == FX_RADIX)
-    return sf_fail(
-        SF_E_UNSUPPORTED,
-        "%s: its spikes are weighted by their step; a NIR graph has no such neuron (see sf_train --input-mode hybrid)",
-        path);
+    return sf_fail(SF_E_UNSUPPORTED,
+                   "%s: in mode radix a layer waits for all spikes of the one before; a NIR graph has no such neuron "
+                   "(see sf_train --input-mode hybrid)",
+                   path);
   sf_nir_graph *g = calloc(1, sizeof *g);
   if (!g) return sf_fail(SF_E_MEMORY, "%s: out of memory", path);
   sf_status status = sf_ok();

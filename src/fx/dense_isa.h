@@ -49,25 +49,19 @@ static INLINE int members(const fx_block *b, int gang)
   return b->n - gang < GANG ? b->n - gang : GANG;
 }
 
-static INLINE void fire_gang(const fx_net *net, int spiking, int mode, const int32_t *current, int step, int gang,
-                             fx_block *b)
+static INLINE void fire_gang(const fx_net *net, int spiking, int mode, const int32_t *current, int step, int shift,
+                             int gang, fx_block *b)
 {
   for (int at = 0; at < SF_LANES; at += TILE * WIDTH) {
-    const currents c = {.kind = WORDS, .from = current + at, .sample = SF_LANES, .step = step};
+    const currents c = {.kind = WORDS, .from = current + at, .sample = SF_LANES, .step = step, .shift = shift};
     fire_layer(net, spiking, mode, &c, at, TILE, gang, members(b, gang), b);
   }
 }
 
-/* C2's currents, of radix one of all steps. */
-static INLINE currents c2_of(const fx_net *net, int mode, int kind, const void *from, int sample, int step)
+/* From C2's currents, of radix the sum of all steps, to its membranes. */
+static INLINE int c2_shift(const fx_net *net, int mode)
 {
-  const int steps = net->steps;
-  return (currents){.kind = kind,
-                    .from = from,
-                    .sample = sample,
-                    .step = step,
-                    .weighed = mode == FX_RADIX ? steps : 0,
-                    .shift = fx_layer_frac(FX_C2, mode) - (mode == FX_RADIX ? steps : 0)};
+  return fx_layer_frac(FX_C2, mode) - (mode == FX_RADIX ? net->steps : 0);
 }
 
 /* C1 of a decoder: constant inputs and biases, once per sample. */
@@ -84,21 +78,44 @@ static INLINE void c1_constant_layer(const fx_core *core, fx_block *b, int mode)
                     (const int32_t *const[]){bias, bias, bias}, &current[0][at]);
     }
     for (int k = 0; k < members(b, i); k++) b->saturated[FX_C1][i + k] += saturate(current[k]);
-    fire_gang(net, 1, mode, current[0], 0, i, b);
+    fire_gang(net, 1, mode, current[0], 0, 0, i, b);
   }
+}
+
+enum { BYTES = 4 * WIDTH };
+
+/* Bytes 0 or 1 of the neurons from `at` on. */
+static INLINE vec spike_vector(const uint64_t bits[SF_SPIKE_WORDS], int at)
+{
+#if defined(__AVX512VNNI__)
+  return _mm512_maskz_set1_epi8(bits[at / 64], 1);
+#else
+  const vec eighth = _mm256_set_epi64x(0x0303030303030303, 0x0202020202020202, 0x0101010101010101, 0);
+  const vec bit = v_set64((int64_t)0x8040201008040201);
+  const vec byte = _mm256_shuffle_epi8(v_word((const uint8_t *)bits + at / 8), eighth);
+  return _mm256_min_epu8(_mm256_and_si256(byte, bit), _mm256_set1_epi8(1));
+#endif
 }
 
 static INLINE void spike_bytes(const uint64_t bits[SF_SPIKE_WORDS], uint8_t bytes[SF_LANES])
 {
-#if defined(__AVX512VNNI__)
-  for (int word = 0; word < SF_SPIKE_WORDS; word++) v_store(bytes + 64 * word, _mm512_maskz_set1_epi8(bits[word], 1));
-#else
-  const vec eighth = _mm256_set_epi64x(0x0303030303030303, 0x0202020202020202, 0x0101010101010101, 0);
-  const vec bit = v_set64((int64_t)0x8040201008040201);
-  for (int at = 0; at < SF_LANES; at += 32) {
-    const vec byte = _mm256_shuffle_epi8(v_word((const uint8_t *)bits + at / 8), eighth);
-    v_store(bytes + at, _mm256_min_epu8(_mm256_and_si256(byte, bit), _mm256_set1_epi8(1)));
+  for (int at = 0; at < SF_LANES; at += BYTES) v_store(bytes + at, spike_vector(bits, at));
+}
+
+/* Radix: the spikes of all steps as numbers below 2^steps. */
+static INLINE void number_bytes(const fx_block *b, int spiking, int steps, int i, uint8_t bytes[SF_LANES])
+{
+  for (int at = 0; at < SF_LANES; at += BYTES) {
+    vec number = spike_vector(b->spikes[spiking][0][i], at);
+    for (int t = 1; t < steps; t++)
+      number = V(add_epi8)(V(add_epi8)(number, number), spike_vector(b->spikes[spiking][t][i], at));
+    v_store(bytes + at, number);
   }
-#endif
+}
+
+/* biases[n]: what they add to the sum of all steps. */
+static INLINE void all_digits(int steps, const int32_t *bias, int n, int32_t *sum)
+{
+  for (int o = 0; o < n; o++) sum[o] = bias[o] * ((1 << steps) - 1);
 }
 #endif

@@ -138,7 +138,7 @@ static INLINE void add_bytes(vec a, vec b, vec sum[2])
 }
 
 /* sum[sample] = sum of its rows of SF_LANES, of the vectors of bytes from `first` on; exact in 16 bits. */
-enum { BYTES = 4 * WIDTH, PARTS = SF_LANES / BYTES < 4 ? SF_LANES / BYTES : 4 /* that registers hold */ };
+enum { PARTS = SF_LANES / BYTES < 4 ? SF_LANES / BYTES : 4 /* that registers hold */ };
 static INLINE void add_parts(const events *e, const int8_t (*w)[SF_LANES], int16_t (*sum)[SF_LANES], int first)
 {
   vec acc[PARTS][2];
@@ -170,11 +170,10 @@ static void c2_currents_events(const fx_words *words, bitmaps spikes, bool bias,
   for (int first = 0; first < SF_LANES / BYTES; first += PARTS) add_parts(&e, words->c2, sum, first);
 }
 
-/* out[k][o] = from[o] + sum of w[q][o] . x[k][q], quads of weights and of bytes 0 or 1. */
-static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8_t (*x)[SF_LANES], const int32_t *from,
-                                                    int16_t *out)
+/* acc[k][o] = from[o] + sum of w[q][o] . x[k][q], quads of weights and of bytes; whole: of 8 bits, else of fewer. */
+static INLINE void quad_sums(const int8_t *w, const uint8_t (*x)[SF_LANES], const int32_t *from, bool whole,
+                             vec acc[GANG][TILE])
 {
-  vec acc[GANG][TILE];
   EACH(k, j) acc[k][j] = v_load(from + j * WIDTH);
   for (int q = 0; q < SF_LANES / 4; q++) {
     vec in[GANG];
@@ -184,10 +183,66 @@ static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8
     for (int j = 0; j < TILE; j++) {
       const vec row = v_load(w + 4 * (q * SF_LANES + j * WIDTH));
 #pragma GCC unroll 3
-      for (int k = 0; k < GANG; k++) acc[k][j] = v_dot4(acc[k][j], in[k], row);
+      for (int k = 0; k < GANG; k++)
+        acc[k][j] = whole ? v_dot4_whole(acc[k][j], in[k], row) : v_dot4(acc[k][j], in[k], row);
     }
   }
+}
+
+static __attribute__((noinline)) void quad_products(const int8_t *w, const uint8_t (*x)[SF_LANES], const int32_t *from,
+                                                    int16_t *out)
+{
+  vec acc[GANG][TILE];
+  quad_sums(w, x, from, false, acc);
   EACH(k, j) v_store_narrow(out + k * SF_LANES + j * WIDTH, acc[k][j]);
+}
+
+/* Of numbers. */
+static __attribute__((noinline)) void number_products(const int8_t *w, const uint8_t (*x)[SF_LANES],
+                                                      const int32_t *from, int bits, int32_t *out)
+{
+  vec acc[GANG][TILE];
+  if (bits > DOT4_BITS)
+    quad_sums(w, x, from, true, acc);
+  else
+    quad_sums(w, x, from, false, acc);
+  EACH(k, j) v_store(out + k * SF_LANES + j * WIDTH, acc[k][j]);
+}
+
+/* The same for the SF_OUT_MAX outputs of D2 or C3. */
+static INLINE void output_sums(const int8_t (*w)[SF_OUT_MAX][4], const uint8_t (*x)[SF_LANES], const int32_t *from,
+                               bool whole, int32_t (*out)[SF_OUT_MAX])
+{
+  enum { PARTS16 = SF_OUT_MAX / WIDTH };
+  vec acc[GANG][PARTS16];
+  for (int k = 0; k < GANG; k++)
+    for (int j = 0; j < PARTS16; j++) acc[k][j] = v_load(from + j * WIDTH);
+  for (int q = 0; q < SF_LANES / 4; q++)
+#pragma GCC unroll 3
+    for (int k = 0; k < GANG; k++) {
+      const vec in = v_word(x[k] + 4 * q);
+#pragma GCC unroll 2
+      for (int j = 0; j < PARTS16; j++) {
+        const vec row = v_load(w[q][j * WIDTH]);
+        acc[k][j] = whole ? v_dot4_whole(acc[k][j], in, row) : v_dot4(acc[k][j], in, row);
+      }
+    }
+  for (int k = 0; k < GANG; k++)
+    for (int j = 0; j < PARTS16; j++) v_store(out[k] + j * WIDTH, acc[k][j]);
+}
+
+static __attribute__((noinline)) void output_products(const int8_t (*w)[SF_OUT_MAX][4], const uint8_t (*x)[SF_LANES],
+                                                      const int32_t *from, int bits, int32_t (*out)[SF_OUT_MAX])
+{
+  if (bits > DOT4_BITS)
+    output_sums(w, x, from, true, out);
+  else
+    output_sums(w, x, from, false, out);
+}
+
+static INLINE void number_gang(const fx_block *b, int spiking, int steps, int gang, uint8_t (*x)[SF_LANES])
+{
+  for (int k = 0; k < GANG; k++) number_bytes(b, spiking, steps, gang + k, x[k]);
 }
 
 static void c2_currents_dense(const fx_words *words, bitmaps spikes, int n, int16_t (*sum)[SF_LANES])
@@ -220,16 +275,20 @@ static INLINE void c2_currents(const fx_words *words, bitmaps spikes, bool bias,
 
 /* ---- the layers, all steps of a block ---- */
 
-/* Radix: h of all steps' currents, in the place of those of step 0. */
-static INLINE void weigh_h(int steps, int n, int16_t (*current)[FX_BLOCK][SF_OUT_MAX])
+/* D2 of radix, one gang: h in the place of the currents of step 0. */
+static INLINE void d2_numbers(const fx_words *words, const fx_block *b, fx_scratch *s, int steps, int gang)
 {
+  static const int32_t none[SF_OUT_MAX];
   const __m128i shift = _mm_cvtsi32_si128(SF_H_SHIFT + steps);
-  for (int i = 0; i < n; i++)
-    for (int o = 0; o < SF_OUT_MAX; o += WIDTH) {
-      vec sum = v_widen(&current[0][i][o]);
-      for (int t = 1; t < steps; t++) sum = V(add_epi32)(V(slli_epi32)(sum, 1), v_widen(&current[t][i][o]));
-      v_store_narrow(&current[0][i][o], V(sra_epi32)(sum, shift));
-    }
+  uint8_t x[GANG][SF_LANES];
+  int32_t sum[GANG][SF_OUT_MAX];
+  number_gang(b, 0, steps, gang, x);
+  output_products(words->d2_quads, (const uint8_t(*)[SF_LANES])x, none, steps, sum);
+  for (int k = 0; k < GANG; k++) {
+    s->argument[0][0][gang + k] = sum[k][0];
+    for (int o = 0; o < SF_OUT_MAX; o += WIDTH)
+      v_store_narrow(&s->d2_current[0][gang + k][o], V(sra_epi32)(v_load(&sum[k][o]), shift));
+  }
 }
 
 static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
@@ -241,17 +300,17 @@ static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *
     for (int at = 0; at < SF_LANES; at += TILE * WIDTH)
       pair_products(words->d1[0][at], SF_FEATURE_MAX / 2, (const int16_t *const[]){b->f[i], b->f[i + 1], b->f[i + 2]},
                     NULL, &current[0][at]);
-    fire_gang(net, 0, mode, current[0], 0, i, b);
+    fire_gang(net, 0, mode, current[0], 0, 0, i, b);
+    if (mode == FX_RADIX) d2_numbers(words, b, s, net->steps, i);
   }
-  for (int t = 0; t < net->steps; t++) {
+  for (int t = 0; t < net->steps && mode != FX_RADIX; t++) {
     d2_currents(words->d2, (bitmaps)b->spikes[0][t], b->n, s->d2_current[t]);
     for (int i = 0; i < b->n; i++) {
       __m256i *current = (__m256i *)s->d2_current[t][i];
       s->argument[t][0][i] = s->d2_current[t][i][0];
-      if (mode != FX_RADIX) _mm256_storeu_si256(current, _mm256_srai_epi16(_mm256_loadu_si256(current), SF_H_SHIFT));
+      _mm256_storeu_si256(current, _mm256_srai_epi16(_mm256_loadu_si256(current), SF_H_SHIFT));
     }
   }
-  if (mode == FX_RADIX) weigh_h(net->steps, b->n, s->d2_current);
 }
 
 static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
@@ -268,17 +327,51 @@ static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int
                       (const int32_t *const[]){b->base[i] + at, b->base[i + 1] + at, b->base[i + 2] + at},
                       &current[t][0][at]);
       }
-    fire_gang(net, 1, mode, current[0][0], GANG * SF_LANES, i, b);
+    fire_gang(net, 1, mode, current[0][0], GANG * SF_LANES, 0, i, b);
   }
+}
+
+static INLINE void c2_numbers(const fx_words *words, const fx_net *net, fx_block *b)
+{
+  const int steps = net->steps;
+  int32_t bias[SF_LANES], current[GANG][SF_LANES];
+  all_digits(steps, words->c2_bias, SF_LANES, bias);
+  for (int i = 0; i < b->n; i += GANG) {
+    uint8_t x[GANG][SF_LANES];
+    number_gang(b, 1, steps, i, x);
+    for (int at = 0; at < SF_LANES; at += TILE * WIDTH)
+      number_products(words->c2_quads[0][at], (const uint8_t(*)[SF_LANES])x, bias + at, steps, &current[0][at]);
+    fire_gang(net, 2, FX_RADIX, current[0], 0, c2_shift(net, FX_RADIX), i, b);
+  }
+}
+
+enum { C2_NUMBERS_PERCENT = 25 }; /* of the spikes of all steps; each step has a list of its own */
+
+/* Radix: whether rows for the spikes of all steps cost as much as all rows once, for numbers. */
+static INLINE bool many_spikes(const fx_block *b, int steps)
+{
+  const int percent = steps > DOT4_BITS ? 2 * C2_NUMBERS_PERCENT : C2_NUMBERS_PERCENT;
+  int sum = 0;
+  for (int t = 0; t < steps; t++) sum += spikes_of_block((bitmaps)b->spikes[1][t], b->n);
+  return sum * 100 > b->n * SF_LANES * percent;
 }
 
 static INLINE void c2_layer(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
 {
   const fx_net *net = &core->scene->net;
+  if (mode == FX_RADIX && many_spikes(b, net->steps)) {
+    c2_numbers(&core->words, net, b);
+    return;
+  }
   for (int t = 0; t < net->steps; t++)
     c2_currents(&core->words, (bitmaps)b->spikes[1][t], net->layer[FX_C2].bias != 0, b->n, s->c2_current[t]);
   for (int at = 0; at < SF_LANES; at += TILE * WIDTH) {
-    const currents c = c2_of(net, mode, HALVES, &s->c2_current[0][0][at], SF_LANES, FX_BLOCK * SF_LANES);
+    const currents c = {.kind = HALVES,
+                        .from = &s->c2_current[0][0][at],
+                        .sample = SF_LANES,
+                        .step = FX_BLOCK * SF_LANES,
+                        .weighed = mode == FX_RADIX ? net->steps : 0,
+                        .shift = c2_shift(net, mode)};
     fire_layer(net, 2, mode, &c, at, TILE, 0, b->n, b);
   }
 }
@@ -300,9 +393,26 @@ static INLINE __m256i c3_sums(const int8_t (*w)[SF_LANES], const uint8_t x[SF_LA
   return _mm256_hadd_epi32(_mm256_hadd_epi32(sum[0], sum[1]), _mm256_hadd_epi32(sum[2], sum[2]));
 }
 
-static INLINE void c3_layer(const fx_core *core, const fx_block *b, fx_scratch *s)
+static INLINE void c3_numbers(const fx_words *words, const fx_block *b, int steps, fx_scratch *s)
+{
+  int32_t bias[SF_OUT_MAX], sum[GANG][SF_OUT_MAX];
+  all_digits(steps, words->c3_bias, SF_OUT_MAX, bias);
+  for (int i = 0; i < b->n; i += GANG) {
+    uint8_t x[GANG][SF_LANES];
+    number_gang(b, 2, steps, i, x);
+    output_products(words->c3_quads, (const uint8_t(*)[SF_LANES])x, bias, steps, sum);
+    for (int k = 0; k < GANG; k++)
+      for (int o = 0; o < COLOURS; o++) s->argument[0][1 + o][i + k] = sum[k][o];
+  }
+}
+
+static INLINE void c3_layer(const fx_core *core, const fx_block *b, fx_scratch *s, int mode)
 {
   const fx_words *words = &core->words;
+  if (mode == FX_RADIX) {
+    c3_numbers(words, b, core->scene->net.steps, s);
+    return;
+  }
   for (int t = 0; t < core->scene->net.steps; t++)
     for (int i = 0; i < b->n; i++) {
       _Alignas(64) uint8_t x[SF_LANES];

@@ -270,6 +270,11 @@ static sf_status read_mode(const sf_tensors *set, fx_scene *scene)
       scene->net.mode = mode;
       return sf_ok();
     }
+  if (text && !strcmp(text, "weighted"))
+    return sf_fail(SF_E_UNSUPPORTED,
+                   "%s: metadata 'mode' is 'weighted', a neuron of an earlier release that this program does not have: "
+                   "train the model anew and export it",
+                   set->path);
   return sf_fail(SF_E_FORMAT, "%s: metadata 'mode' is '%.40s', expected hybrid, decay, no-decay or radix", set->path,
                  text ? text : "");
 }

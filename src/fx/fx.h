@@ -36,6 +36,12 @@ static inline int fx_layer_frac(int layer, int32_t mode)
   return mode == FX_RADIX ? SF_T_MAX : SF_AC_FRAC;
 }
 
+/* Bits of a layer's state. What radix adds up in D2 and C3 are currents: fx_weigh. */
+static inline int fx_layer_state_bits(int layer, int32_t mode)
+{
+  return mode == FX_RADIX && !fx_layer_fires(layer) ? SF_MEMBRANE_BITS : fx_layer_table[layer].state_bits;
+}
+
 /* One layer. Weights are stored by presynaptic neuron: w[i * SF_LANES + o] is the weight from
  * input i to output o; row i is the fan-out of i and one word of the weight memory. Lanes
  * >= n_out are zero. C1's rows are the n_dir direction rows first, then the n_h rows of h.
@@ -239,14 +245,18 @@ typedef struct fx_ray {
 /* Events, counted per layer and time step. What is one event, exactly:
  *   mac     D1: n_in*n_out per sample, at step 0. C1: n_dir*n_out per ray that has a sample (step 0 of its first
  *           sample) + n_h*n_out per step, of radix at step 0 alone; of a decoder n_in*n_out per sample, at step 0.
- * (zero inputs count too) sop     D2, C2, C3: (firing presynaptic neurons at step t) * n_out; biases are no MAC and no
- * SOP spikes  D1, C1, C2: neurons that fired at step t updates D1, C1, C2: n_out per step; D2: 1 per step (density
- * integrator); C3: 3 per step. Radix: D2 n_out per step; C2 2*n_out per step, n_out at the last: its neurons add up T
- * sums and fire T times, the first time with the last sum weight  bytes read, 1 per weight: D1 n_in*n_out at step 0; C1
- * as its MACs; C2 as its SOPs; D2, C3: n_out for each presynaptic neuron active at ANY step, at the first step at which
- * it fired; biases n_out more: C1 with its constant inputs, C2 at every step, C3 at step 0 state_r / state_w  bytes of
- * membrane: updates*3 (D1, C1, C2) or updates*4 (D2, C3); the first update reads nothing special exp (D2: 1 per step)
- * and sigmoid (C3: 3 per step) evaluations; of radix at the last step alone A decoder has none in D1 and D2. */
+ *           Zero inputs count too
+ *   sop     D2, C2, C3: (firing presynaptic neurons at step t) * n_out; biases are no MAC and no SOP
+ *   spikes  D1, C1, C2: neurons that fired at step t
+ *   updates D1, C1, C2: n_out per step; D2: 1 per step (density integrator); C3: 3 per step. Radix: D2 n_out per
+ *           step; C2 2*n_out per step, n_out at the last: its neurons add up T sums and fire T times, the first time
+ *           with the last sum
+ *   weight  bytes read, 1 per weight: D1 n_in*n_out at step 0; C1 as its MACs; C2 as its SOPs; D2, C3: n_out for
+ *           each presynaptic neuron active at ANY step, at the first step at which it fired; biases n_out more: C1 with
+ *           its constant inputs, C2 at every step, C3 at step 0
+ *   state_r / state_w  bytes of membrane: updates*3 (D1, C1, C2) or updates*4 (D2, C3); the first update reads nothing
+ *   special exp (D2: 1 per step) and sigmoid (C3: 3 per step) evaluations; of radix at the last step alone
+ * A decoder has none in D1 and D2. */
 typedef union fx_layer_counts {
   uint64_t event[SF_EVENTS][SF_T_MAX]; /* by sf_event_id */
   struct {

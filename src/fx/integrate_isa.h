@@ -104,15 +104,15 @@ static INLINE void integrate_step(const fx_net *net, fx_block *b, fx_scratch *s,
   }
 }
 
-/* The argument of output `at` (0: the density) for samples i..i + WIDTH - 1: the weighed sum of currents. The product
+/* The argument of output `at` (0: the density) for samples i..i + WIDTH - 1: the sum of all steps. The product
  * takes 40 bits, so this part is scalar: it happens once per sample. */
-static INLINE vec weighed_argument(const fx_scratch *s, int steps, int i, int at, const fx_scale *scale)
+static INLINE vec weighed_argument(const fx_scratch *s, int i, int at, const fx_scale *scale)
 {
   _Alignas(64) int32_t y[WIDTH];
-  vec sum = v_load(&s->argument[0][at][i]);
-  for (int t = 1; t < steps; t++) sum = V(add_epi32)(V(slli_epi32)(sum, 1), v_load(&s->argument[t][at][i]));
-  v_store(y, sum);
-  for (int l = 0; l < WIDTH; l++) y[l] = at ? fx_sigmoid_argument(y[l], scale) : fx_exp2_argument(y[l], scale);
+  for (int l = 0; l < WIDTH; l++) {
+    const int32_t sum = s->argument[0][at][i + l];
+    y[l] = at ? fx_sigmoid_argument(sum, scale) : fx_exp2_argument(sum, scale);
+  }
   return v_load(y);
 }
 
@@ -120,10 +120,9 @@ static INLINE vec weighed_argument(const fx_scratch *s, int steps, int i, int at
 static INLINE void read_weighed(const fx_net *net, fx_block *b, fx_scratch *s)
 {
   const fx_scale density = fx_net_scale(net, &net->exp_in), colour = fx_net_scale(net, &net->sigmoid_in);
-  const int steps = net->steps;
   for (int i = 0; i < b->n; i += WIDTH) {
-    if (!fx_net_decodes(net)) v_store(&s->acc[0][i], densities_of(weighed_argument(s, steps, i, 0, &density), b, i));
-    for (int o = 1; o <= COLOURS; o++) v_store(&s->acc[o][i], sigmoid_of(weighed_argument(s, steps, i, o, &colour)));
+    if (!fx_net_decodes(net)) v_store(&s->acc[0][i], densities_of(weighed_argument(s, i, 0, &density), b, i));
+    for (int o = 1; o <= COLOURS; o++) v_store(&s->acc[o][i], sigmoid_of(weighed_argument(s, i, o, &colour)));
   }
 }
 #endif

@@ -92,8 +92,9 @@ static inline fx_fired fx_block_fired(const fx_block *b, int i, int steps)
 typedef struct fx_scratch {
   _Alignas(64) int16_t d2_current[SF_T_MAX][FX_BLOCK][SF_OUT_MAX];
   _Alignas(64) int16_t c2_current[SF_T_MAX][FX_BLOCK][SF_LANES];
-  _Alignas(64) int32_t argument[SF_T_MAX][4][FX_BLOCK]; /* of the density and the colours */
-  uint32_t acc[4][FX_BLOCK];                            /* density, red, green, blue */
+  _Alignas(64) int32_t
+      argument[SF_T_MAX][4][FX_BLOCK]; /* of the density and the colours; of radix at step 0 that of all steps */
+  uint32_t acc[4][FX_BLOCK];           /* density, red, green, blue */
   /* of tiles: inputs as rows of bytes, sums of 16 neurons */
   _Alignas(64) uint8_t x[SF_T_MAX * FX_BLOCK][SF_LANES];
   _Alignas(64) int32_t sum[SF_T_MAX * FX_BLOCK][16];

@@ -27,7 +27,7 @@ static INLINE void nets_of_mode(const fx_core *core, fx_block *b, fx_scratch *s,
     c1_layer(core, b, s, mode);
   }
   c2_layer(core, b, s, mode);
-  c3_layer(core, b, s);
+  c3_layer(core, b, s, mode);
   if (mode == FX_RADIX)
     read_weighed(net, b, s);
   else

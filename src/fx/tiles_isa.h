@@ -79,6 +79,30 @@ static INLINE void spike_rows(const fx_block *b, int spiking, int steps, uint8_t
     for (int i = 0; i < b->n; i++) spike_bytes(b->spikes[spiking][t][i], x[t * FX_BLOCK + i]);
 }
 
+/* Blocks of rows that a layer has: its steps, or of radix one. */
+static INLINE int blocks_of(const fx_net *net, int mode)
+{
+  return mode == FX_RADIX ? 1 : net->steps;
+}
+
+/* What the layer behind gets: bytes 0 or 1 of every step, or of radix numbers. */
+static INLINE void input_rows(const fx_net *net, const fx_block *b, int spiking, int mode, uint8_t (*x)[SF_LANES])
+{
+  if (mode != FX_RADIX)
+    spike_rows(b, spiking, net->steps, x);
+  else
+    for (int i = 0; i < b->n; i++) number_bytes(b, spiking, net->steps, i, x[i]);
+}
+
+/* 16 biases as a block adds them, or NULL. */
+static INLINE const int32_t *biases_of(const fx_net *net, int layer, int mode, const int32_t *bias, int32_t all[SIDE])
+{
+  if (!net->layer[layer].bias) return NULL;
+  if (mode != FX_RADIX) return bias;
+  all_digits(net->steps, bias, SIDE, all);
+  return all;
+}
+
 /* 16 inputs as pairs of low, high. */
 static INLINE void input_row(vec x, uint8_t *row)
 {
@@ -107,19 +131,15 @@ static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *
     input_products(words->d1_twice[o / SIDE], ROW, true, s->x[0], SF_LANES, NULL, false, 1, s->sum);
     fire_layer(net, 0, mode, &c, o, 1, 0, b->n, b);
   }
-  spike_rows(b, 0, net->steps, s->x);
-  spike_products(words->d2_quads[0], ROW, (const uint8_t(*)[SF_LANES])s->x, NULL, net->steps, s->sum);
-  for (int t = 0; t < net->steps; t++)
+  const int blocks = blocks_of(net, mode), shift = SF_H_SHIFT + (mode == FX_RADIX ? net->steps : 0);
+  input_rows(net, b, 0, mode, s->x);
+  spike_products(words->d2_quads[0], ROW, (const uint8_t(*)[SF_LANES])s->x, NULL, blocks, s->sum);
+  for (int t = 0; t < blocks; t++)
     for (int i = 0; i < b->n; i++) {
       const vec current = v_load(s->sum[t * FX_BLOCK + i]);
       s->argument[t][0][i] = s->sum[t * FX_BLOCK + i][0];
-      if (mode != FX_RADIX) h_row(current, SF_H_SHIFT, s->x[t * FX_BLOCK + i]);
+      h_row(current, shift, s->x[t * FX_BLOCK + i]);
     }
-  for (int i = 0; i < b->n && mode == FX_RADIX; i++) {
-    vec sum = v_load(s->sum[i]);
-    for (int t = 1; t < net->steps; t++) sum = V(add_epi32)(V(slli_epi32)(sum, 1), v_load(s->sum[t * FX_BLOCK + i]));
-    h_row(sum, SF_H_SHIFT + net->steps, s->x[i]);
-  }
 }
 
 static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int mode)
@@ -130,10 +150,10 @@ static INLINE void c1_layer(const fx_core *core, fx_block *b, fx_scratch *s, int
     const currents c = {.kind = REALS,
                         .from = s->sum,
                         .sample = SIDE,
-                        .step = FX_BLOCK * SIDE, /* of radix, step 0 is read alone */
+                        .step = FX_BLOCK * SIDE, /* of radix step 0 is read alone */
                         .base = (const int32_t *const *)b->base};
-    input_products(words->c1_h_twice[o / SIDE], ROW, false, s->x[0], SF_LANES, NULL, false,
-                   mode == FX_RADIX ? 1 : net->steps, s->sum);
+    input_products(words->c1_h_twice[o / SIDE], ROW, false, s->x[0], SF_LANES, NULL, false, blocks_of(net, mode),
+                   s->sum);
     fire_layer(net, 1, mode, &c, o, 1, 0, b->n, b);
   }
 }
@@ -142,23 +162,27 @@ static INLINE void c2_layer(const fx_core *core, fx_block *b, fx_scratch *s, int
 {
   const fx_words *words = &core->words;
   const fx_net *net = &core->scene->net;
-  spike_rows(b, 1, net->steps, s->x);
+  input_rows(net, b, 1, mode, s->x);
   for (int o = 0; o < SF_LANES; o += SIDE) {
-    const currents c = c2_of(net, mode, WORDS, s->sum, SIDE, FX_BLOCK * SIDE);
+    const currents c = {
+        .kind = WORDS, .from = s->sum, .sample = SIDE, .step = FX_BLOCK * SIDE, .shift = c2_shift(net, mode)};
+    int32_t all[SIDE];
     spike_products(words->c2_tiles[o / SIDE][0], ROW, (const uint8_t(*)[SF_LANES])s->x,
-                   net->layer[FX_C2].bias ? words->c2_bias + o : NULL, net->steps, s->sum);
+                   biases_of(net, FX_C2, mode, words->c2_bias + o, all), blocks_of(net, mode), s->sum);
     fire_layer(net, 2, mode, &c, o, 1, 0, b->n, b);
   }
 }
 
-static INLINE void c3_layer(const fx_core *core, const fx_block *b, fx_scratch *s)
+static INLINE void c3_layer(const fx_core *core, const fx_block *b, fx_scratch *s, int mode)
 {
   const fx_words *words = &core->words;
   const fx_net *net = &core->scene->net;
-  spike_rows(b, 2, net->steps, s->x);
+  const int blocks = blocks_of(net, mode);
+  int32_t all[SIDE];
+  input_rows(net, b, 2, mode, s->x);
   spike_products(words->c3_quads[0], ROW, (const uint8_t(*)[SF_LANES])s->x,
-                 net->layer[FX_C3].bias ? words->c3_bias : NULL, net->steps, s->sum);
-  for (int t = 0; t < net->steps; t++)
+                 biases_of(net, FX_C3, mode, words->c3_bias, all), blocks, s->sum);
+  for (int t = 0; t < blocks; t++)
     for (int o = 0; o < COLOURS; o++)
       for (int i = 0; i < b->n; i++) s->argument[t][1 + o][i] = s->sum[t * FX_BLOCK + i][o];
 }

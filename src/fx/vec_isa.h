@@ -22,7 +22,8 @@ static INLINE vec v_dot(vec acc, vec a, vec b) /* += of both 16-bit products */
   __asm__("vpdpwssd %2, %1, %0" : "+v"(acc) : "v"(a), "v"(b));
   return acc;
 }
-static INLINE vec v_dot4(vec acc, vec u8, vec s8) /* += of four products; u8 is 0 or 1 */
+enum { DOT4_BITS = 8 };                           /* of u8 that v_dot4 multiplies exactly */
+static INLINE vec v_dot4(vec acc, vec u8, vec s8) /* += of four products */
 {
   __asm__("vpdpbusd %2, %1, %0" : "+v"(acc) : "v"(u8), "v"(s8));
   return acc;
@@ -74,6 +75,7 @@ static INLINE vec v_dot(vec acc, vec a, vec b)
 {
   return _mm256_add_epi32(acc, _mm256_madd_epi16(a, b));
 }
+enum { DOT4_BITS = 7 };
 static INLINE vec v_dot4(vec acc, vec u8, vec s8)
 {
   return _mm256_add_epi32(acc, _mm256_madd_epi16(_mm256_maddubs_epi16(u8, s8), _mm256_set1_epi16(1)));
@@ -146,6 +148,13 @@ static INLINE vec v_word(const void *p) /* the 32 bits at p in every lane */
 static INLINE vec v_clamp(vec x, int32_t low, int32_t high)
 {
   return V(max_epi32)(V(min_epi32)(x, v_set(high)), v_set(low));
+}
+/* v_dot4 of all 8 bits of u8: in 16 bits two products may saturate, so each stands alone. */
+static INLINE vec v_dot4_whole(vec acc, vec u8, vec s8)
+{
+  if (DOT4_BITS == 8) return v_dot4(acc, u8, s8);
+  const vec even = v_set(0x00ff00ff);
+  return v_dot4(v_dot4(acc, V_BITS(and)(even, u8), s8), V_BITS(andnot)(even, u8), s8);
 }
 /* fx_rshift_round, arithmetic; x + 2^(n-1) must fit 32 bits. */
 static INLINE vec v_shift_round(vec x, int n)

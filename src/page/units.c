@@ -18,8 +18,11 @@ static void width_basis(FILE *out, const fx_net *net, int row, int part)
     break;
   case SF_PART_NEURON:
     fprintf(out, "%s%s of %d bits; twin: 32 \xc3\x97 16 bits and an addition of 32",
-            net->mode == FX_RADIX ? "doubling" : "leak",
-            fx_layer_fires(row) ? ", compare, reset" : " of an integrator", fx_layer_table[row].state_bits);
+            net->mode == FX_RADIX ? (fx_layer_fires(row) ? "compare, reset" : "addition") : "leak",
+            net->mode == FX_RADIX ? ""
+            : fx_layer_fires(row) ? ", compare, reset"
+                                  : " of an integrator",
+            fx_layer_state_bits(row, net->mode));
     break;
   default:
     fprintf(out, "two products, two additions and two reads of a table of 1028 bytes");

@@ -23,6 +23,12 @@ static sizes sizes_of(const sf_model *model)
   return s;
 }
 
+/* Rows of spikes that a sample has. */
+static size_t trains_of(const sf_calibration *c)
+{
+  return c->digits ? 1 : (size_t)c->steps;
+}
+
 static sf_status allocate(sf_calibration *c, const sizes *s)
 {
   const size_t samples = (size_t)c->samples;
@@ -33,7 +39,7 @@ static sf_status allocate(sf_calibration *c, const sizes *s)
     const size_t rows = samples * (size_t)c->per_sample[l];
     if (!rows) continue;
     ok = (c->target[l] = calloc(rows, s->n_out[l] * sizeof(float))) != NULL;
-    if (ok && fx_layer_fires(l)) ok = (c->spikes[l] = calloc(samples * (size_t)c->steps, s->n_out[l])) != NULL;
+    if (ok && fx_layer_fires(l)) ok = (c->spikes[l] = calloc(samples * trains_of(c), s->n_out[l])) != NULL;
   }
   return ok ? sf_ok() : sf_fail(SF_E_MEMORY, "quantiser: no memory for %d calibration samples", c->samples);
 }
@@ -53,7 +59,19 @@ static void draw_direction(float *direction, uint64_t seed, uint64_t stream, int
   direction[0] = r * cosf(angle), direction[1] = r * sinf(angle), direction[2] = z;
 }
 
-static void keep_trace(sf_calibration *c, const sizes *s, const sf_net_trace *trace, size_t sample)
+static void keep_digits(sf_calibration *c, const sizes *s, const sf_net_trace *trace, size_t sample)
+{
+  for (int l = 0; l < SF_LAYERS; l++)
+    for (size_t o = 0, at = sample * s->n_out[l]; o < s->n_out[l]; o++, at++)
+      for (int t = 0, value = 1 << (c->digits - 1); t < c->digits; t++, value /= 2) {
+        if (fx_layer_fires(l)) c->spikes[l][at] += (uint8_t)(value * (trace->spike[l][t][o] != 0));
+        if (!fx_layer_fires(l)) c->target[l][at] += (float)value * trace->current[l][t][o];
+        if (t == 0 && fx_layer_fires(l))
+          c->target[l][at] = trace->current[l][t][o] * (float)(fx_layer_reads_spikes(l) ? 2 * value : 1);
+      }
+}
+
+static void keep_steps(sf_calibration *c, const sizes *s, const sf_net_trace *trace, size_t sample)
 {
   for (int l = 0; l < SF_LAYERS; l++) {
     const size_t n = s->n_out[l], rows = (size_t)c->per_sample[l], steps = (size_t)c->steps;
@@ -73,7 +91,7 @@ static void run_sample(sf_calibration *c, const sf_model *model, const sf_field_
   memset(trace, 0, sizeof *trace);
   field->sample(model, x, direction, c->steps, c->f + (size_t)sample * (size_t)c->features,
                 c->constant + (size_t)sample * (size_t)c->constants, trace);
-  keep_trace(c, s, trace, (size_t)sample);
+  (c->digits ? keep_digits : keep_steps)(c, s, trace, (size_t)sample);
 }
 
 static sf_status run_samples(sf_calibration *c, const sf_model *model, const sf_field_quantiser *field, const sizes *s,
@@ -100,9 +118,12 @@ sf_status sf_calibrate(sf_calibration *c, const sf_model *model, int steps, uint
   const sf_field_quantiser *field = sf_field_quantiser_of(model);
   const sizes s = sizes_of(model);
   const size_t h = s.n_out[FX_D2] ? s.n_out[FX_D2] - 1 : 0;
-  *c = (sf_calibration){
-      .samples = SAMPLES, .steps = steps, .features = field->features(model), .constants = (int)(s.n_in[FX_C1] - h)};
-  for (int l = 0; l < SF_LAYERS; l++) c->per_sample[l] = !s.n_out[l] ? 0 : l == FX_C1 && !h ? 1 : steps;
+  *c = (sf_calibration){.samples = SAMPLES,
+                        .steps = steps,
+                        .digits = model->config.mode == SF_RADIX ? steps : 0,
+                        .features = field->features(model),
+                        .constants = (int)(s.n_in[FX_C1] - h)};
+  for (int l = 0; l < SF_LAYERS; l++) c->per_sample[l] = !s.n_out[l] ? 0 : c->digits || (l == FX_C1 && !h) ? 1 : steps;
   SF_TRY(allocate(c, &s));
   SF_TRY(field->draw(c, model, seed));
   return run_samples(c, model, field, &s, seed);

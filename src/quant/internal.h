@@ -4,15 +4,18 @@
 #include "quant/quant.h"
 
 /* Calibration samples: positions with random directions, and what the float field and nets do there. A row of a layer's
- * data is one step of one sample; where C1 has no input that changes with the step, its row is the sample. */
+ * data is one step of one sample; where C1 has no input that changes with the step, its row is the sample.
+ * Of radix every layer has one row of a sample: a spike train is a number below 2^steps, and the target of a layer that
+ * gets them is the sum of its currents with the digits' weights as whole numbers, as fx_weigh adds up. */
 typedef struct sf_calibration {
   int samples, steps;
   int features, constants; /* of the field; inputs of C1 that come with the sample: harmonics, or all of a decoder's */
+  int digits;              /* of a spike train: steps of radix, else 0 */
   int per_sample[SF_LAYERS];  /* rows of a sample; 0: the net has no such layer */
   uint32_t *pos;              /* [samples][3] Q0.24 */
   float *f, *constant;        /* [samples][features], [samples][constants] */
   float *target[SF_LAYERS];   /* [rows][n_out] currents of the float nets */
-  uint8_t *spikes[SF_LAYERS]; /* [rows][n_out] of D1, C1, C2 */
+  uint8_t *spikes[SF_LAYERS]; /* [samples * steps, of radix samples][n_out] of D1, C1, C2 */
 } sf_calibration;
 sf_status sf_calibrate(sf_calibration *calibration, const sf_model *model, int steps, uint64_t seed);
 void sf_calibration_free(sf_calibration *calibration);

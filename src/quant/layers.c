@@ -31,7 +31,7 @@ static double theta_of(const sf_model *model, int layer)
   return 0;
 }
 
-/* Of theta, membrane LSB: neurons of weighted spikes fire at 2 theta. */
+/* Of theta, membrane LSB: fx/plif.c. */
 static double largest_theta(const sf_model *model)
 {
   return model->config.mode == SF_RADIX ? MEMBRANE_LIMIT / 2 : MEMBRANE_LIMIT;
@@ -150,27 +150,17 @@ static double colour_error(const context *c, const int16_t *x, double unit)
 {
   const fx_layer *to = &c->scene->net.layer[FX_C3];
   const sf_calibration *cal = c->calibration;
-  const int inputs = fx_layer_rows(to), steps = cal->per_sample[FX_C3], rows = rows_of(cal, FX_C3);
-  const bool behind = c->model->config.mode == SF_RADIX; /* the sum: the activation stands there */
-  double error = 0, exact[3] = {0}, found[3] = {0}, weight = 0;
-  for (int row = 0; row < rows; row++) {
-    const int16_t *in = x + (size_t)row * (size_t)inputs;
-    const double share = behind ? ldexp(1, -(row % steps)) : 1;
-    weight += share;
-    for (int o = 0; o < to->n_out; o++) {
+  const size_t inputs = (size_t)fx_layer_rows(to), n_out = (size_t)to->n_out;
+  const double whole = ldexp(1, -cal->digits);
+  double error = 0;
+  for (size_t row = 0; row < (size_t)rows_of(cal, FX_C3); row++)
+    for (size_t o = 0; o < n_out; o++) {
       int32_t sum = 0;
-      for (int i = 0; i < inputs; i++) sum += in[i] ? to->w[i * SF_LANES + o] : 0; /* spikes, and the bias' 1 */
-      exact[o] += share * (double)cal->target[FX_C3][(size_t)row * (size_t)to->n_out + (size_t)o];
-      found[o] += share * unit * sum;
-    }
-    if (behind && (row + 1) % steps) continue;
-    for (int o = 0; o < to->n_out; o++) {
-      const double d = 1 / (1 + exp(-exact[o] / weight)) - 1 / (1 + exp(-found[o] / weight));
+      for (size_t i = 0; i < inputs; i++) sum += x[row * inputs + i] * to->w[i * SF_LANES + o];
+      const double exact = whole * (double)cal->target[FX_C3][row * n_out + o];
+      const double d = 1 / (1 + exp(-exact)) - 1 / (1 + exp(-whole * unit * sum));
       error += d * d;
-      exact[o] = found[o] = 0;
     }
-    weight = 0;
-  }
   return error;
 }
 
@@ -259,12 +249,14 @@ static int bias_input(const context *c, const double *lsb)
   return value < 1 ? 1 : value > c->input_limit ? c->input_limit : (int)value;
 }
 
-/* Constant inputs rounded to their LSB, h rounded down to its own as the accelerator does. Sets the bias' input. */
+/* Constant inputs rounded to their LSB, h rounded down to its own as the accelerator does: currents are whole numbers
+ * of LSBs of D2, which take H_SHIFT bits of h, and of radix are the sum of all digits. Sets the bias' input. */
 static void colour_inputs(const context *c, const input_format *f, int16_t *x, double *lsb)
 {
   const sf_calibration *cal = c->calibration;
   fx_layer *to = &c->scene->net.layer[FX_C1];
-  const int n = cal->constants, h = to->n_in - n, one = 1 << SF_H_SHIFT, per_sample = cal->per_sample[FX_C1];
+  const int n = cal->constants, h = to->n_in - n, one = 1 << SF_H_SHIFT, all = one << cal->digits,
+            per_sample = cal->per_sample[FX_C1];
   for (int i = 0; i < to->n_in; i++) lsb[i] = lsb_of(c, f, i);
   if (to->bias) {
     to->bias = c->settled ? (int32_t)lround(1 / (double)c->settled->lsb.bias) : bias_input(c, lsb);
@@ -276,7 +268,7 @@ static void colour_inputs(const context *c, const input_format *f, int16_t *x, d
     int16_t *in = x + (size_t)row * (size_t)fx_layer_rows(to);
     for (int i = 0; i < n; i++) in[i] = to_input(nearbyint(constant[i] / lsb[i]), c->input_limit);
     for (int j = 0; j < h; j++)
-      in[n + j] = to_input(floor(nearbyint(one * current[1 + j] / f->h) / one), c->input_limit);
+      in[n + j] = to_input(floor(nearbyint(one * current[1 + j] / f->h) / all), c->input_limit);
     if (to->bias) in[to->n_in] = (int16_t)to->bias;
   }
 }
@@ -334,11 +326,12 @@ static sf_status spike_layer(const context *c, int layer, int from, int16_t *x)
 {
   const fx_layer *to = &c->scene->net.layer[layer];
   const size_t n_in = (size_t)to->n_in, inputs = (size_t)fx_layer_rows(to);
+  const int16_t always = c->calibration->digits ? (int16_t)((1 << c->calibration->digits) - 1) : 1;
   double lsb[SF_LANES + 1];
   for (size_t i = 0; i < inputs; i++) lsb[i] = 1;
   for (size_t row = 0; row < (size_t)rows_of(c->calibration, layer); row++) {
     for (size_t i = 0; i < n_in; i++) x[row * inputs + i] = c->calibration->spikes[from][row * n_in + i];
-    if (to->bias) x[row * inputs + n_in] = 1;
+    if (to->bias) x[row * inputs + n_in] = always;
   }
   return finish_layer(c, layer, x, lsb);
 }

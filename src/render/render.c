@@ -72,6 +72,7 @@ static void flush(worker *w)
   for (int level = 0; level < w->model->config.levels; level++)
     w->kernels->grid_forward(&w->model->level[level], table, w->x, w->block->f + 2 * level * SF_BLOCK);
   w->block->lanes = w->fill;
+  w->block->from = w->steps - w->pictures;
   if (w->net->view.along)
     w->kernels->along_forward(w->net, w->block, w->scratch);
   else

@@ -44,6 +44,7 @@ static void flush(worker *w)
   pad(w);
   const sf_net_view *net = &w->decoder->net.view;
   w->block->net.lanes = w->fill;
+  w->block->net.from = w->steps - w->pictures;
   if (net->along)
     w->kernels->decoder_along_forward(w->decoder, w->block, w->scratch);
   else

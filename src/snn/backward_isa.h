@@ -52,20 +52,19 @@ static inline void fire_backward(const sf_net_view *net, int layer, float k, int
     return;
   }
   const int hybrid_first = t == 0 && net->mode == SF_HYBRID;
-  const int weighted = net->mode == SF_RADIX, whole = net->mode >= SF_NODECAY || hybrid_first;
-  const float keep = weighted ? 2.0f : 1.0f - k, gain = whole ? 1.0f : k, with_h = whole ? 0.0f : keep;
-  const float with_v = weighted ? 0.0f : net->mode == SF_NODECAY ? -k : -1.0f;
+  const int whole = net->mode == SF_NODECAY || hybrid_first;
+  const float keep = 1.0f - k, gain = whole ? 1.0f : k, with_h = whole ? 0.0f : keep;
+  const float with_v = net->mode == SF_NODECAY ? -k : -1.0f;
   const vf theta = (vf){0} + net->theta[layer], one = (vf){0} + 1.0f, charge = (vf){0} + net->charge[layer];
-  const vf lost = (vf){0} + sf_plif_reset((sf_input_mode)net->mode, net->theta[layer]);
   for (int l = 0; l < B; l += VL) {
     vf sum_h = {0}, sum_v = {0};
     for (int r = 0; r < rows; r++) {
       const int i = r * B + l;
       const vf x = *(const vf *)(h + i), gv = *(const vf *)(carry + i);
-      const vf v = x - (vf)((x >= theta) & (vi)lost);
+      const vf v = x - (vf)((x >= theta) & (vi)theta);
       vf gs = *(const vf *)(g + i);
       if (fired) gs += (vf)((*(const vf *)(fired + i) == (vf)((x >= theta) & (vi)one)) & (vi)charge);
-      const vf gh = (gs - lost * gv) * surrogate(x - theta) + gv;
+      const vf gh = (gs - theta * gv) * surrogate(x - theta) + gv;
       *(vf *)(carry + i) = keep * gh;
       *(vf *)(g + i) = gain * gh;
       sum_h += gh * x;
@@ -110,9 +109,7 @@ static void integrate_backward(const sf_net_view *net, float k, int t, const flo
     for (int i = 0; i < B; i++) de[i] = g[i];
     return;
   }
-  const int weighted = net->mode == SF_RADIX;
-  const float share = weighted ? sf_step_share(t) : k, keep = 1.0f - share, slope = weighted ? 0.0f : k * keep;
-  const float gain = net->mode == SF_NODECAY ? 1.0f : share;
+  const float keep = 1.0f - k, slope = k * keep, gain = net->mode == SF_NODECAY ? 1.0f : k;
   const float with_e = net->mode == SF_NODECAY ? 0.0f : 1.0f;
   for (int i = 0; i < B; i++) {
     float before = t ? prev[i] : 0.0f;
@@ -131,28 +128,6 @@ static void add_to(float *restrict sum, const float *restrict x, int n)
 static inline float exp_slope(float x)
 {
   return fast_exp(x > 15.0f ? 15.0f : x < -15.0f ? -15.0f : x);
-}
-
-/* The outputs' gradients of prefix t, added to those of what they integrate. */
-static void add_density_gradient(const sf_net_view *net, const sf_block *x, int t, const float *dsigma, float *gsigma)
-{
-  if (net->mode != SF_RADIX) {
-    add_to(gsigma, dsigma + t * B, B);
-    return;
-  }
-  for (int l = 0; l < B; l++) gsigma[l] += dsigma[t * B + l] * exp_slope(x->i_sum[t][l]);
-}
-
-static void add_colour_gradient(const sf_net_view *net, const sf_block *x, int t, const float *dcolour, float *gcolour)
-{
-  if (net->mode != SF_RADIX) {
-    add_to(gcolour, dcolour + t * 3 * B, 3 * B);
-    return;
-  }
-  for (int l = 0; l < 3 * B; l++) {
-    const float c = x->colour[t][l];
-    gcolour[l] += dcolour[t * 3 * B + l] * c * (1.0f - c);
-  }
 }
 
 /* What layer_backward leaves behind; NULL = not wanted. fired: what it reads, as fire_backward. */
@@ -215,12 +190,10 @@ static void colour_output_backward(const sf_net_words *n, const sf_block *x, int
   uint32_t small[4 * B], *lanes = lanes_beside(w->rows, w->lanes);
   sigmoid(3 * B, x->j[t], c);
   memset(gj + 3 * B, 0, B * sizeof *gj);
-  const bool weighted = net->mode == SF_RADIX;
-  const float *const in = weighted ? x->j[t] : c, *const sums = weighted ? x->j_sum[0] : x->colour[0];
   for (int a = 0; a < 3; a++)
-    integrate_backward(net, net->k[4], t, in + a * B, t ? sums + (3 * (t - 1) + a) * B : NULL, gcolour + a * B,
-                       gj + a * B, w->leak[4]);
-  for (int i = 0; i < 3 * B && !weighted; i++) gj[i] *= c[i] * (1.0f - c[i]);
+    integrate_backward(net, net->k[4], t, c + a * B, t ? x->colour[t - 1] + a * B : NULL, gcolour + a * B, gj + a * B,
+                       w->leak[4]);
+  for (int i = 0; i < 3 * B; i++) gj[i] *= c[i] * (1.0f - c[i]);
   add_outer(grad->w5, hidden, lane_words(gj, 4, small), 4, activations(net, 2, x->m4[t], w), hidden);
   const bool events = by_spikes(net, x->s3[t], BACKWARD);
   layer_backward(net, 2, net->k[3], t, n->w5t, 4 / PAIR, row_words(gj, 4, small), x->m4[t],
@@ -270,8 +243,6 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
 {
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden;
-  const bool weighted = net->mode == SF_RADIX;
-  const float *const sums = weighted ? x->i_sum[0] : x->sigma[0];
   const size_t plane = (size_t)hidden * B * sizeof(float);
   float gsigma[B] = {0}, gcolour[3 * B] = {0};
   tiles_begin();
@@ -285,13 +256,12 @@ static void backward(const sf_net_words *n, const sf_block *x, int steps, const 
   for (int t = steps - 1; t >= 0; t--) {
     float gi[SF_DENSITY_OUT * B], ge[B], e[B];
     uint32_t small[SF_DENSITY_OUT * B];
-    add_density_gradient(net, x, t, dsigma, gsigma);
-    add_colour_gradient(net, x, t, dcolour, gcolour);
+    add_to(gsigma, dsigma + t * B, B);
+    add_to(gcolour, dcolour + t * 3 * B, 3 * B);
     exponential(B, x->i[t], e);
-    integrate_backward(net, net->k[1], t, weighted ? x->i[t] : e, t ? sums + (t - 1) * B : NULL, gsigma, ge,
-                       w->leak[1]);
+    integrate_backward(net, net->k[1], t, e, t ? x->sigma[t - 1] : NULL, gsigma, ge, w->leak[1]);
     colour_backward(n, x, t, gcolour, gi, grad, w);
-    for (int l = 0; l < B; l++) gi[l] = weighted ? ge[l] : ge[l] * exp_slope(x->i[t][l]);
+    for (int l = 0; l < B; l++) gi[l] = ge[l] * exp_slope(x->i[t][l]);
     if (looked_up(net)) {
       uint64_t fired[SF_LANES];
       layer_spikes(net, 0, x->m1[t], fired);

@@ -4,7 +4,7 @@
  * Included by kernels_isa.c only. */
 #ifndef SF_SNN_DECODER_ISA_H
 #define SF_SNN_DECODER_ISA_H
-#include "snn/backward_isa.h"
+#include "snn/radix_isa.h"
 
 /* Rows of the decoder's inputs: the inputs, the one, zeros. */
 static inline int decoder_rows(const sf_decoder_view *v)
@@ -136,7 +136,12 @@ static void decoder_forward(const sf_decoder_words *n, sf_decoder_block *d, int 
   sf_block *x = &d->net;
   tiles_begin();
   decoder_inputs(n, d, w);
-  for (int t = 0; t < steps; t++) {
+  for (int p = x->from; p < steps && is_radix(v); p++) {
+    float *current = x->m3[slot(p, keep)];
+    memcpy(current, w->sum3, (size_t)v->hidden * B * sizeof *current);
+    radix_colour_prefix(net, x, p, keep, NULL, 0, NULL, NULL, n->b2, n->b3, w);
+  }
+  for (int t = 0; t < steps && !is_radix(v); t++) {
     layer(v, 1, v->k[2], t, NULL, 0, NULL, w->sum3, t ? x->m3[slot(t - 1, keep)] : NULL, x->m3[slot(t, keep)],
           looked_up(v) ? NULL : words(w->spikes));
     after_colour_1(net, x, t, steps, keep, n->b2, n->b3, w);
@@ -191,10 +196,20 @@ static void decoder_backward(const sf_decoder_words *n, sf_decoder_block *d, int
   memset(w->sum1, 0, plane);
   memset(w->sum3, 0, plane);
   memset(w->leak, 0, sizeof w->leak);
-  if (charged(v)) count_fired(v, &d->net, 1, steps, w);
-  for (int t = steps - 1; t >= 0; t--) {
+  if (charged(v) && !is_radix(v)) count_fired(v, &d->net, 1, steps, w);
+  for (int p = d->net.from; p < steps && is_radix(v); p++) {
+    float gj[4 * B], room[B], of_c2[SF_LANES * B];
+    const float *fired = charged_lanes(v, &d->net, p + 1 == steps, room), all = sf_all_digits(p + 1);
+    memset(of_c2, 0, plane);
+    radix_output_backward(net, &d->net, p, fired, dcolour, gj, of_c2, &grad->net, w);
+    for (int i = 0; i < hidden * B; i++) w->sum1[i] += all * of_c2[i];
+    for (int i = 0; i < 4 * B; i++) gsum[i] += all * gj[i];
+    waiting_backward(v, 1, p + 1, net->w4t, hidden / PAIR, words(w->rows), d->net.m3[p], fired,
+                     (waiting_out){w->sum3, NULL, NULL});
+  }
+  for (int t = steps - 1; t >= 0 && !is_radix(v); t--) {
     float gj[4 * B];
-    add_colour_gradient(v, &d->net, t, dcolour, gcolour);
+    add_to(gcolour, dcolour + t * 3 * B, 3 * B);
     colour_output_backward(net, &d->net, t, gcolour, gj, w->sum1, &grad->net, w);
     add_to(gsum, gj, 4 * B);
     layer_backward(v, 1, v->k[2], t, net->w4t, hidden / PAIR, words(w->rows), d->net.m3[t],

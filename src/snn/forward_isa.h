@@ -31,16 +31,16 @@ static inline float fast_exp(float x)
 static inline void charge(const sf_net_view *net, int layer, float k, int t, int rows, const float *restrict current,
                           const float *prev, float *h)
 {
-  const float theta = net->theta[layer], lost = sf_plif_reset((sf_input_mode)net->mode, theta);
+  const float theta = net->theta[layer];
   const int n = rows * B;
   if (net->relu || (t == 0 && net->mode != SF_DECAY))
     memcpy(h, current, (size_t)n * sizeof *h);
   else if (t == 0)
     for (int i = 0; i < n; i++) h[i] = current[i] * k;
   else {
-    const float keep = net->mode == SF_RADIX ? 2.0f : 1.0f - k, gain = net->mode >= SF_NODECAY ? 1.0f : k;
+    const float keep = 1.0f - k, gain = net->mode == SF_NODECAY ? 1.0f : k;
 #pragma GCC ivdep /* h may be prev: element by element */
-    for (int i = 0; i < n; i++) h[i] = keep * (prev[i] - (prev[i] >= theta ? lost : 0.0f)) + gain * current[i];
+    for (int i = 0; i < n; i++) h[i] = keep * (prev[i] - (prev[i] >= theta ? theta : 0.0f)) + gain * current[i];
   }
 }
 
@@ -71,8 +71,7 @@ static void integrate(const sf_net_view *net, float k, int t, int n, const float
   else if (t == 0)
     for (int i = 0; i < n; i++) o[i] = k * e[i];
   else {
-    const float share = net->mode == SF_RADIX ? sf_step_share(t) : k;
-    const float gain = net->mode == SF_NODECAY ? 1.0f : share, keep = 1.0f - share;
+    const float gain = net->mode == SF_NODECAY ? 1.0f : k, keep = 1.0f - k;
     for (int i = 0; i < n; i++) o[i] = keep * prev[i] + gain * e[i];
   }
 }
@@ -93,29 +92,19 @@ static inline int slot(int t, int keep)
   return t < keep ? t : SF_T_MAX - 1;
 }
 
-/* Outputs of step t from their currents: sigma or colour, and what they have integrated, of the step before, too. */
+/* Outputs of step t, sigma or colour, from their currents and those of the step before. */
 static void read_density(const sf_net_view *net, int t, const float *i, sf_block *x)
 {
   float e[B];
-  if (net->mode == SF_RADIX) {
-    integrate(net, net->k[1], t, B, i, t ? x->i_sum[t - 1] : NULL, x->i_sum[t]);
-    exponential(B, x->i_sum[t], x->sigma[t]);
-  } else {
-    exponential(B, i, e);
-    integrate(net, net->k[1], t, B, e, t ? x->sigma[t - 1] : NULL, x->sigma[t]);
-  }
+  exponential(B, i, e);
+  integrate(net, net->k[1], t, B, e, t ? x->sigma[t - 1] : NULL, x->sigma[t]);
 }
 
 static void read_colour(const sf_net_view *net, int t, sf_block *x)
 {
   float c[3 * B];
-  if (net->mode == SF_RADIX) {
-    integrate(net, net->k[4], t, 3 * B, x->j[t], t ? x->j_sum[t - 1] : NULL, x->j_sum[t]);
-    sigmoid(3 * B, x->j_sum[t], x->colour[t]);
-  } else {
-    sigmoid(3 * B, x->j[t], c);
-    integrate(net, net->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);
-  }
+  sigmoid(3 * B, x->j[t], c);
+  integrate(net, net->k[4], t, 3 * B, c, t ? x->colour[t - 1] : NULL, x->colour[t]);
 }
 
 /* Spikes of a layer, from its membranes before fire: a bit per lane. */
@@ -207,7 +196,7 @@ static void forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_
   density_net(n, x, steps, keep, w->sum1, w);
   for (int t = 0; t < steps; t++) {
     if (net->h_step > 0)
-      for (int a = B; a < SF_DENSITY_OUT * B; a++) x->i[t][a] = sf_round_h(x->i[t][a], net->h_step);
+      for (int a = B; a < SF_DENSITY_OUT * B; a++) x->i[t][a] = sf_round_h(x->i[t][a], net->h_step, 0);
     layer(net, 1, net->k[2], t, operands(n->w3h), SF_DENSITY_OUT / PAIR, row_words(x->i[t], SF_DENSITY_OUT, w->rows),
           w->sum3, t ? x->m3[slot(t - 1, keep)] : NULL, x->m3[slot(t, keep)], looked_up(net) ? NULL : words(w->spikes));
     after_colour_1(n, x, t, steps, keep, NULL, NULL, w);

@@ -13,9 +13,9 @@ uint64_t SF_JOIN(sf_march_points_, SF_ISA)(const sf_march *march, int word); /* 
 
 const sf_kernels SF_JOIN(sf_kernels_, SF_ISA) = {.name = SF_TEXT(SF_ISA),
                                                  .prepare = prepare,
-                                                 .forward = forward,
-                                                 .density = density,
-                                                 .backward = backward,
+                                                 .forward = nets_forward,
+                                                 .density = nets_density,
+                                                 .backward = nets_backward,
                                                  .grid_forward = grid_forward,
                                                  .grid_backward = grid_backward,
                                                  .march = SF_JOIN(sf_march_points_, SF_ISA),

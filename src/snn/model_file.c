@@ -99,12 +99,17 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   if (!format || strcmp(format, "spikefield-model"))
     return sf_fail(SF_E_FORMAT, "%s: not a spikefield model (metadata format is '%.40s')", set->path,
                    format ? format : "absent");
-  if (!version || strcmp(version, "1"))
-    return sf_fail(SF_E_UNSUPPORTED, "%s: model version '%.20s', this program reads version 1", set->path,
+  if (!version || (strcmp(version, "1") && strcmp(version, "2")))
+    return sf_fail(SF_E_UNSUPPORTED, "%s: model version '%.20s', this program reads versions 1 and 2", set->path,
                    version ? version : "absent");
   sf_number number_of[CONFIG_NUMBERS], more[SF_NUMBERS_MAX];
   config_numbers(c, number_of);
   SF_TRY(load_numbers(set, number_of, CONFIG_NUMBERS));
+  if (!strcmp(version, "1") && c->mode == SF_RADIX && c->net == SF_NET_SNN) /* mode 3 was another neuron there */
+    return sf_fail(SF_E_UNSUPPORTED,
+                   "%s: its neurons are the weighted ones of an earlier release, which this program does not have: train "
+                   "the model anew",
+                   set->path);
   if (sf_tensors_meta(set, "backbone")) SF_TRY(meta_int(set, "backbone", &c->backbone));
   if (c->backbone < 0 || c->backbone >= SF_FIELDS)
     return sf_fail(SF_E_RANGE, "%s: model config: backbone = %d is outside 0..%d", set->path, c->backbone,
@@ -138,7 +143,7 @@ void sf_model_describe(const sf_model *m, cJSON *meta)
   sf_config c = m->config;
   sf_number number_of[CONFIG_NUMBERS], more[SF_NUMBERS_MAX];
   cJSON_AddStringToObject(meta, "format", "spikefield-model");
-  cJSON_AddStringToObject(meta, "version", "1");
+  cJSON_AddStringToObject(meta, "version", "2");
   config_numbers(&c, number_of);
   put_numbers(meta, number_of, CONFIG_NUMBERS);
   sf_tensors_put_number(meta, "bound", c.bound);

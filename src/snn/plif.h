@@ -7,39 +7,33 @@
 
 enum { SF_SURROGATE_ALPHA = 8 };
 
-/* Membrane after charging, before fire: previous membrane v, current i, leak k = 1/tau, step t. */
+/* Membrane after charging, before fire: previous membrane v, current i, leak k = 1/tau, step t. In radix mode it takes
+ * its current once, and doubles what is left. */
 static inline float sf_plif_charge(sf_input_mode mode, int t, float k, float v, float i)
 {
-  if (mode == SF_RADIX) return 2 * v + i;
+  if (mode == SF_RADIX) return t ? 2 * v : i;
   if (mode == SF_NODECAY) return v - v * k + i;
   if (mode == SF_HYBRID && t == 0) return i;
   return v + (i - v) * k;
 }
 
-/* What a spike takes from the membrane. A weighted spike rounds to the nearest digit: it comes at half of what it is
- * worth. */
-static inline float sf_plif_reset(sf_input_mode mode, float theta)
+/* Radix mode: what a spike of step t is worth, the binary digit 2^-(t+1). */
+static inline float sf_digit(int t)
 {
-  return mode == SF_RADIX ? 2 * theta : theta;
+  return 1.0f / (float)(2 << t);
 }
 
-/* Weighted spikes: the share of step t in the mean of steps 0..t, of which each weighs half of the one before. */
-static inline float sf_step_share(int t)
+/* What a train of spikes at every one of `steps` steps is worth, a bias for one. */
+static inline float sf_all_digits(int steps)
 {
-  return 1.0f / (float)((2 << t) - 1);
+  return 1 - 1.0f / (float)(1 << steps);
 }
 
-/* An output that integrates without firing: o before, x comes in. Of weighted spikes it is the weighted mean. */
-static inline float sf_plif_integrate(sf_input_mode mode, int t, float k, float o, float x)
+/* h as the accelerator sees it: current >> SF_H_SHIFT. Currents are multiples of step >> SF_H_SHIFT, in radix mode of
+ * that over 2^digits, but for their rounding, which half of that keeps from deciding. digits: 0 in the other modes. */
+static inline float sf_round_h(float h, float step, int digits)
 {
-  return mode == SF_RADIX ? o + (x - o) * sf_step_share(t) : sf_plif_charge(mode, t, k, o, x);
-}
-
-/* h as the accelerator sees it: current >> SF_H_SHIFT. Currents are multiples of step >> SF_H_SHIFT but for their
- * rounding, which half of that keeps from deciding. */
-static inline float sf_round_h(float h, float step)
-{
-  return step * floorf(h / step + 0.5f / (1 << SF_H_SHIFT));
+  return step * floorf(h / step + 0.5f / (float)(1 << (SF_H_SHIFT + digits)));
 }
 
 /* A real-valued input as the accelerator sees it, a multiple of step in SF_INPUT_BITS; step 0: as it is. Adding and

@@ -85,6 +85,7 @@ static void find_densities(sf_trainer *t, const sf_loss_plan *p, int part, const
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
   for (int b = block[part]; b < block[part + 1]; b++) {
     memcpy(to->f, batch->f + (size_t)b * plane, plane * sizeof(float));
+    to->from = sf_loss_from(p);
     to->lanes = sf_block_lanes(lanes, b - block[part]);
     if (t->model.config.along) {
       to->first = beginnings(batch, part, b);

@@ -87,7 +87,32 @@ static void count_along(const sf_config *c, int first, const sf_block *b, int la
   }
 }
 
-int sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
+/* Radix mode: a layer's spikes of all steps, from its current. */
+static void count_digits(const float *current, int rows, int lanes, int steps, float theta, double *spikes,
+                         double *fired)
+{
+  for (int r = 0; r < rows; r++)
+    for (int l = 0; l < lanes; l++) {
+      float v = current[r * SF_BLOCK + l];
+      int count = 0;
+      for (int s = 0; s < steps; s++) {
+        const bool spike = v >= theta;
+        count += spike;
+        v = sf_plif_charge(SF_RADIX, s + 1, 0, v - (spike ? theta : 0), 0);
+      }
+      *spikes += count;
+      *fired += count > 0;
+    }
+}
+
+static void count_radix(const sf_config *c, int first, int steps, const sf_block *b, int lanes, sf_group *g)
+{
+  const float *const current[3] = {b->m1[0], b->m3[steps - 1], b->m4[steps - 1]};
+  for (int l = first; l < 3; l++)
+    count_digits(current[l], c->hidden, lanes, steps, c->theta[l], &g->spikes[l], &g->fired[l]);
+}
+
+int sf_mark_lanes(const sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, sf_worker *w)
 {
   const sf_ray *ray = t->batch.ray + bundle->ray;
   const int lanes = bundle->rays ? ray[bundle->rays - 1].first + ray[bundle->rays - 1].count : 0;
@@ -95,6 +120,7 @@ int sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
     sf_block *block = (sf_block *)((char *)w->block + (size_t)b * t->backbone->block_bytes); /* of a decoder's: first */
     block->lanes = sf_block_lanes(lanes, b);
     block->first = 0;
+    block->from = sf_loss_from(p);
     if (!t->model.config.along) continue;
     for (int l = 0; l < SF_BLOCK; l++) block->state[l] = &w->state;
     for (int r = 0; r < bundle->rays; r++)
@@ -106,12 +132,14 @@ int sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *w)
 void sf_count_spikes(const sf_trainer *t, int first, int steps, const sf_block *b, int lanes, sf_group *g)
 {
   const sf_config *c = &t->model.config;
+  const bool radix = c->mode == SF_RADIX && c->net == SF_NET_SNN;
   if (c->along) count_along(c, first, b, lanes, g);
-  for (int s = 0; s < steps && !c->along; s++) {
+  if (radix) count_radix(c, first, steps, b, lanes, g);
+  for (int s = 0; s < steps && !c->along && !radix; s++) {
     const float *const membrane[3] = {b->m1[s], b->m3[s], b->m4[s]};
     for (int l = first; l < 3; l++) g->spikes[l] += at_threshold(membrane[l], c->hidden, lanes, c->theta[l]);
   }
-  for (int l = first; l < 3 && !c->along; l++) g->fired[l] += at_any_step(b, l, steps, c->hidden, lanes, c->theta[l]);
+  for (int l = first; l < 3 && !c->along && !radix; l++) g->fired[l] += at_any_step(b, l, steps, c->hidden, lanes, c->theta[l]);
   g->neurons += (double)steps * c->hidden * lanes;
   g->lanes += lanes;
 }

@@ -91,7 +91,7 @@ static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundl
   const sf_batch *batch = &t->batch;
   const size_t plane = (size_t)2 * t->model.config.levels * SF_BLOCK;
   const bool along = t->model.config.along;
-  const int lanes = sf_mark_lanes(t, bundle, w);
+  const int lanes = sf_mark_lanes(t, p, bundle, w);
   load_directions(t, bundle, lanes, w);
   for (int b = 0; b < bundle->blocks; b++) {
     load_block(t, bundle, b, &block[b]);

@@ -82,6 +82,13 @@ static inline bool sf_loss_needs(const sf_loss_plan *p, int prefix)
 {
   return p->full || p->weight[prefix - 1] > 0;
 }
+/* The prefixes before it, 0 for that of one step, are not composited. */
+static inline int sf_loss_from(const sf_loss_plan *p)
+{
+  int from = 0;
+  while (from < p->steps - 1 && !sf_loss_needs(p, from + 1)) from++;
+  return from;
+}
 
 typedef struct sf_loss_sums {
   double prefix[SF_T_MAX]; /* squared error of the prefixes that are composited */
@@ -357,7 +364,7 @@ static inline int sf_block_lanes(int lanes, int index)
 }
 /* Tells the blocks how many of their lanes hold samples, and of a net along rays, where its rays begin. Returns the
  * bundle's lanes that hold samples. */
-int sf_mark_lanes(const sf_trainer *t, const sf_bundle *bundle, sf_worker *worker);
+int sf_mark_lanes(const sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle, sf_worker *worker);
 /* to[rows][columns] += from[rows][ld]. */
 void sf_matrix_add(float *to, const float *from, int rows, int columns, int ld);
 /* to[rows][columns] += the transpose of from[columns][rows]. */

@@ -93,6 +93,7 @@ static void visit_block(sf_trainer *t, const visit *v, int steps, size_t first, 
   }
   const float *table = sf_model_param(&t->model, SF_P_GRID);
   sf_block *block = w->block;
+  block->from = steps - 1;
   for (int level = 0; level < t->model.config.levels; level++)
     t->kernels->grid_forward(&t->model.level[level], table, x, block->f + 2 * level * SF_BLOCK);
   t->kernels->density(t->net, block, steps, w->scratch);

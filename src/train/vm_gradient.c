@@ -65,7 +65,7 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
   sf_vm *vm = t->vm;
   const int products = vm->decoder->view.products;
   const bool along = t->model.config.along;
-  const int lanes = sf_mark_lanes(t, bundle, w);
+  const int lanes = sf_mark_lanes(t, p, bundle, w);
   load_directions(t, bundle, lanes, w);
   for (int b = 0; b < bundle->blocks; b++) {
     t->kernels->vm_products(&vm->appearance, vm->x + (size_t)(bundle->block + b) * 3 * SF_BLOCK, SF_BLOCK,

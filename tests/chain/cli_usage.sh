@@ -74,7 +74,7 @@ usage "--charge has no effect on --net ann" sf_train d -o out --net ann --charge
 usage "--steps-along-ray has no effect on --net ann" sf_train d -o out --net ann --steps-along-ray
 usage "--fixed-steps has no effect beside --steps-along-ray" sf_train d -o out --steps-along-ray --fixed-steps 2
 usage "--charge has no effect beside --steps-along-ray" sf_train d -o out --steps-along-ray --charge 0.2
-usage "--input-mode radix needs steps" sf_train d -o out --steps-along-ray --input-mode weighted
+usage "--input-mode radix needs steps" sf_train d -o out --steps-along-ray --input-mode radix
 usage "number of steps is fixed" sf_train d -o out --steps-along-ray --target-loss 0.1
 SPIKEFIELD_CPU=avx data "SPIKEFIELD_CPU=avx: expected portable, avx2" sf_train d -o out
 usage "exclude each other" sf_train d -o out --target-loss 0.1 --target-saving 50

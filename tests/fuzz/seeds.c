@@ -147,7 +147,7 @@ static void put_scenes(void)
   fx_scene factors = tensorf_scene();
   put_scene((fx_scene){0}, "small.snn", &(fixture_sizes){1, 1, 2, 1, 1, 2, 2, FX_HYBRID, {0}}, 1);
   put_scene((fx_scene){0}, "hashed.snn", &(fixture_sizes){5, 3, 3, 2, 5, 4, 3, FX_NODECAY, {0}}, 2);
-  put_scene((fx_scene){0}, "weighted.snn", &(fixture_sizes){2, 4, 3, 2, 4, 3, 4, FX_RADIX, {0}}, 4);
+  put_scene((fx_scene){0}, "radix.snn", &(fixture_sizes){2, 4, 3, 2, 4, 3, 4, FX_RADIX, {0}}, 4);
   put_scene(unbounded, "unbounded.snn", &(fixture_sizes){2, 3, 3, 2, 5, 4, 2, FX_DECAY, {0, 0, 900, 1, 1}}, 3);
   FUZZ_EXPECT(fuzz_good(fx_scene_save(&factors, seed_path("snn", "tensorf.snn"))));
   fx_scene_free(&factors);

@@ -1,0 +1,270 @@
+/* Radix mode: a layer waits for all digits of its inputs, so it needs one product, whatever the steps (docs/model.md).
+ * Every prefix is a pass of its own. A block keeps the currents of D1 in m1[0], of C1 and C2 in m3 and m4 of the prefix.
+ * Oracle: net.c. Included by kernels_isa.c only. */
+#ifndef SF_SNN_RADIX_ISA_H
+#define SF_SNN_RADIX_ISA_H
+#include "snn/backward_isa.h"
+
+static inline bool is_radix(const sf_net_view *net)
+{
+  return net->mode == SF_RADIX && !net->relu;
+}
+
+/* What the spikes of `steps` steps are worth: worth[rows][B]. */
+static inline void digits(float theta, int steps, int rows, const float *restrict current, float *restrict worth)
+{
+  const vf at = (vf){0} + theta;
+  for (int i = 0; i < rows * B; i += VL) {
+    vf v = load(current + i), sum = {0};
+    for (int t = 0; t < steps; t++) {
+      const vi s = v >= at;
+      const vf digit = (vf){0} + sf_digit(t);
+      sum += (vf)(s & (vi)digit);
+      v = 2.0f * (v - (vf)(s & (vi)at));
+    }
+    store(worth + i, sum);
+  }
+}
+
+/* Backward of a layer's rows: g, gradient of what the spikes are worth in, of the current out. Follows fire_backward.
+ * fired[B]: NULL, or firing is charged: 0, and 2 where no sample is. */
+static inline __attribute__((always_inline)) void digits_backward_of(const sf_net_view *net, int layer, const int steps,
+                                                                     int rows, const float *restrict current,
+                                                                     const float *fired, float *restrict g)
+{
+  const vf theta = (vf){0} + net->theta[layer], one = (vf){0} + 1.0f, charge = (vf){0} + net->charge[layer];
+  for (int i = 0; i < rows * B; i += VL) {
+    vf h[SF_T_MAX], v = load(current + i), count = {0};
+    for (int t = 0; t < steps; t++) {
+      const vi s = v >= theta;
+      h[t] = v;
+      if (fired) count += (vf)(s & (vi)one);
+      v = 2.0f * (v - (vf)(s & (vi)theta));
+    }
+    if (fired) count += load(fired + i % B);
+    const vf worth = load(g + i);
+    vf carry = {0}, gh = {0};
+    for (int t = steps - 1; t >= 0; t--) {
+      vf gs = sf_digit(t) * worth;
+      if (fired) gs += (vf)((count == (vf)((h[t] >= theta) & (vi)one)) & (vi)charge);
+      gh = (gs - theta * carry) * surrogate(h[t] - theta) + carry;
+      carry = 2.0f * gh;
+    }
+    store(g + i, gh);
+  }
+}
+
+/* The same with a constant number of steps, which stay in registers. */
+static void digits_backward(const sf_net_view *net, int layer, int steps, int rows, const float *current,
+                            const float *fired, float *g)
+{
+#define OF(n)                                                                                                          \
+  case n:                                                                                                              \
+    if (fired)                                                                                                         \
+      digits_backward_of(net, layer, n, rows, current, fired, g);                                                      \
+    else                                                                                                               \
+      digits_backward_of(net, layer, n, rows, current, NULL, g);                                                       \
+    break
+  switch (steps) {
+    OF(1);
+    OF(2);
+    OF(3);
+    OF(4);
+    OF(5);
+    OF(6);
+    OF(7);
+    OF(8);
+  }
+#undef OF
+}
+
+/* A layer's current = init + w in, and what its spikes are worth, as words of rows. */
+static void waiting_layer(const sf_net_view *net, int index, int steps, const uint32_t *w, int pairs, const word *in,
+                          const float *init, float *current, word *worth)
+{
+  float tile[LAYER_ROWS * B];
+  for (int m = 0, n; m < net->hidden; m += n) {
+    n = layer_rows(net->hidden - m);
+    if (w)
+      gemm(operands(w) + m * pairs, pairs, n, pairs, in, B, B, init ? init + m * B : NULL, B, current + m * B, B);
+    digits(net->theta[index], steps, n, current + m * B, tile);
+    const word *from = row_words(tile, n, (uint32_t *)(worth + m / PAIR * B));
+    if (PAIR == 1) memcpy(worth + m * B, from, (size_t)n * B * sizeof *from);
+  }
+}
+
+/* room[rows][B]: all digits of a bias; NULL without one. */
+static const float *bias_digits(const float *bias, int rows, int steps, float *room)
+{
+  const float all = sf_all_digits(steps);
+  if (!bias) return NULL;
+  for (int i = 0; i < rows * B; i++) room[i] = all * bias[i];
+  return room;
+}
+
+/* D1's current to x->m1[0]. */
+static void radix_density_current(const sf_net_words *n, sf_block *x, sf_net_scratch *w)
+{
+  constant_current(n, n->w1, n->view.features, x->f, w->rows, x->m1[0]);
+}
+
+/* D2's currents to x->i[p], and the density of prefix p + 1. */
+static void radix_density_prefix(const sf_net_words *n, sf_block *x, int p, sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int pairs = net->hidden / PAIR;
+  waiting_layer(net, 0, p + 1, NULL, 0, NULL, NULL, x->m1[0], words(w->spikes));
+  gemm(operands(n->w2), pairs, SF_DENSITY_OUT, pairs, words(w->spikes), B, B, NULL, 0, x->i[p], B);
+  exponential(B, x->i[p], x->sigma[p]);
+}
+
+/* From C1's current, or what it is made from (as waiting_layer), to the colour of prefix p + 1. */
+static void radix_colour_prefix(const sf_net_words *n, sf_block *x, int p, int keep, const uint32_t *w3, int pairs3,
+                                const word *in, const float *base, const float *bias2, const float *bias3,
+                                sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int hidden = net->hidden, pairs = hidden / PAIR, at = slot(p, keep);
+  float b3[4 * B];
+  waiting_layer(net, 1, p + 1, w3, pairs3, in, base, x->m3[at], words(w->spikes));
+  waiting_layer(net, 2, p + 1, n->w4, pairs, words(w->spikes), bias_digits(bias2, hidden, p + 1, w->currents),
+                x->m4[at], words(w->rows));
+  gemm(operands(n->w5), pairs, 4, pairs, words(w->rows), B, B, bias_digits(bias3, 4, p + 1, b3), B, x->j[p], B);
+  sigmoid(3 * B, x->j[p], x->colour[p]);
+}
+
+static void radix_density(const sf_net_words *n, sf_block *x, int steps, sf_net_scratch *w)
+{
+  tiles_begin();
+  radix_density_current(n, x, w);
+  for (int p = x->from; p < steps; p++) radix_density_prefix(n, x, p, w);
+  tiles_end();
+}
+
+static void radix_forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_net_scratch *w)
+{
+  const float step = n->view.h_step;
+  tiles_begin();
+  radix_density_current(n, x, w);
+  constant_current(n, n->w3d, SF_DIR_FEATURES, x->sh, w->rows, w->sum3);
+  for (int p = x->from; p < steps; p++) {
+    radix_density_prefix(n, x, p, w);
+    for (int a = B; a < SF_DENSITY_OUT * B && step > 0; a++) x->i[p][a] = sf_round_h(x->i[p][a], step, p + 1);
+    radix_colour_prefix(n, x, p, keep, n->w3h, SF_DENSITY_OUT / PAIR, row_words(x->i[p], SF_DENSITY_OUT, w->rows),
+                        w->sum3, NULL, NULL, w);
+  }
+  tiles_end();
+}
+
+/* Words of lanes of what a layer's spikes are worth, transposed for add_outer. */
+static const word *worth_lanes(const sf_net_view *net, int layer, int steps, const float *current, sf_net_scratch *w)
+{
+  float tile[LAYER_ROWS * B];
+  word *to = words(w->spikes);
+  for (int m = 0, n; m < net->hidden; m += n) {
+    n = layer_rows(net->hidden - m);
+    digits(net->theta[layer], steps, n, current + m * B, tile);
+    const word *from = lane_words(tile, n, (uint32_t *)(to + m * BW));
+    if (PAIR == 1) memcpy(to + m * BW, from, (size_t)n * BW * sizeof *from);
+  }
+  transpose(to, net->hidden, BW, words(w->t), net->hidden);
+  return operands(w->t);
+}
+
+/* What a layer's backward pass leaves: the current's gradient, as words; rows or lanes NULL: not wanted. */
+typedef struct waiting_out {
+  float *sum; /* it is added here, or NULL */
+  uint32_t *rows, *lanes;
+} waiting_out;
+
+/* Backward of a layer from the gradient dy (words of rows) of the layer above through its transposed weights
+ * wt[hidden][pairs]. */
+static void waiting_backward(const sf_net_view *net, int index, int steps, const uint32_t *wt, int pairs,
+                             const word *dy, const float *current, const float *fired, waiting_out out)
+{
+  float own[LAYER_ROWS * B];
+  for (int m = 0, n; m < net->hidden; m += n) {
+    n = layer_rows(net->hidden - m);
+    float *tile = PAIR == 1 && out.rows ? floats(out.rows + m * B) : own;
+    gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
+    digits_backward(net, index, steps, n, current + m * B, fired, tile);
+    if (out.sum) add_to(out.sum + m * B, tile, n * B);
+    if (PAIR == 1) continue;
+    if (out.rows) row_words(tile, n, out.rows + m / PAIR * B);
+    if (out.lanes) lane_words(tile, n, out.lanes + m * BW);
+  }
+}
+
+/* C3 and C2 of prefix p + 1. Leaves the gradient of C2's current as words of rows in w->rows; gj[4][B], the fourth row
+ * zero. sum: that gradient is added here, or NULL. */
+static void radix_output_backward(const sf_net_words *n, const sf_block *x, int p, const float *fired,
+                                  const float *dcolour, float *gj, float *sum, sf_net_grad *grad, sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int hidden = net->hidden;
+  uint32_t small[4 * B], *lanes = lanes_beside(w->rows, w->lanes);
+  memset(gj, 0, 4 * B * sizeof *gj);
+  for (int l = 0; l < 3 * B; l++) {
+    const float c = x->colour[p][l];
+    gj[l] = dcolour[p * 3 * B + l] * c * (1.0f - c);
+  }
+  add_outer(grad->w5, hidden, lane_words(gj, 4, small), 4, worth_lanes(net, 2, p + 1, x->m4[p], w), hidden);
+  waiting_backward(net, 2, p + 1, n->w5t, 4 / PAIR, row_words(gj, 4, small), x->m4[p], fired,
+                   (waiting_out){sum, w->rows, lanes});
+  add_outer(grad->w4, hidden, operands(lanes), hidden, worth_lanes(net, 1, p + 1, x->m3[p], w), hidden);
+}
+
+/* fired of digits_backward for prefix p + 1 of `steps`: the last one is charged. */
+static const float *charged_lanes(const sf_net_view *net, const sf_block *x, bool last, float *room)
+{
+  for (int l = 0; l < B; l++) room[l] = l < x->lanes ? 0.0f : 2.0f;
+  return last && charged(net) ? room : NULL;
+}
+
+static void radix_backward(const sf_net_words *n, const sf_block *x, int steps, const float *dsigma,
+                           const float *dcolour, float *df, sf_net_grad *grad, sf_net_scratch *w)
+{
+  const sf_net_view *net = &n->view;
+  const int hidden = net->hidden;
+  const size_t plane = (size_t)hidden * B * sizeof(float);
+  tiles_begin();
+  memset(w->sum1, 0, plane);
+  memset(w->sum3, 0, plane);
+  for (int p = x->from; p < steps; p++) {
+    float gj[4 * B], gi[SF_DENSITY_OUT * B], room[B];
+    uint32_t small[SF_DENSITY_OUT * B], *rows = w->spikes, *lanes = lanes_beside(rows, w->lanes);
+    const float *fired = charged_lanes(net, x, p + 1 == steps, room);
+    radix_output_backward(n, x, p, fired, dcolour, gj, NULL, grad, w);
+    waiting_backward(net, 1, p + 1, n->w4t, hidden / PAIR, operands(w->rows), x->m3[p], fired,
+                     (waiting_out){w->sum3, rows, lanes});
+    gemm(operands(n->w3ht), hidden / PAIR, SF_DENSITY_OUT, hidden / PAIR, operands(rows), B, B, NULL, 0, gi, B);
+    transpose(lane_words(x->i[p], SF_DENSITY_OUT, w->rows), SF_DENSITY_OUT, BW, words(w->t), SF_DENSITY_OUT);
+    /* Column 16 of the padded gradient meets i[0], which is no input of C1: scratch. h starts at column 17. */
+    add_outer(grad->w3 + SF_DIR_FEATURES, 32, operands(lanes), hidden, words(w->t), SF_DENSITY_OUT);
+    for (int l = 0; l < B; l++) gi[l] = dsigma[p * B + l] * exp_slope(x->i[p][l]);
+    add_outer(grad->w2, hidden, lane_words(gi, SF_DENSITY_OUT, small), SF_DENSITY_OUT,
+              worth_lanes(net, 0, p + 1, x->m1[0], w), hidden);
+    waiting_backward(net, 0, p + 1, n->w2t, SF_DENSITY_OUT / PAIR, row_words(gi, SF_DENSITY_OUT, small), x->m1[0],
+                     fired, (waiting_out){w->sum1, NULL, NULL});
+  }
+  constant_backward(n, x, df, grad, w);
+  tiles_end();
+}
+
+/* The nets in any mode. */
+static void nets_forward(const sf_net_words *n, sf_block *x, int steps, int keep, sf_net_scratch *w)
+{
+  (is_radix(&n->view) ? radix_forward : forward)(n, x, steps, keep, w);
+}
+
+static void nets_density(const sf_net_words *n, sf_block *x, int steps, sf_net_scratch *w)
+{
+  (is_radix(&n->view) ? radix_density : density)(n, x, steps, w);
+}
+
+static void nets_backward(const sf_net_words *n, const sf_block *x, int steps, const float *dsigma,
+                          const float *dcolour, float *df, sf_net_grad *grad, sf_net_scratch *w)
+{
+  (is_radix(&n->view) ? radix_backward : backward)(n, x, steps, dsigma, dcolour, df, grad, w);
+}
+#endif
