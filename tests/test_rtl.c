@@ -34,15 +34,20 @@ TEST(stalls_hide_behind_the_engine)
   ck_assert_double_eq_tol((double)cycles, model, 0.01 * model);
 }
 
+static void compare_cycles(random_source *r, int n, bool extreme)
+{
+  fx_counts counts = {0};
+  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r->seed, 0);
+  draw_batch(&shared, r, n, extreme);
+  run_batch(dut, &net_of_test.net, n, &counts, r->seed);
+  same_cycles(dut, &net_of_test.net, n, r->seed);
+}
+
 static void check_cycles(uint64_t seed, int n, bool extreme)
 {
   random_source r = {seed, 0};
   random_net_make(&net_of_test, &r, extreme);
-  fx_counts counts = {0};
-  OWNED(sf_dut) *dut = open_dut(&net_of_test.net, r.seed, 0);
-  draw_batch(&shared, &r, n, extreme);
-  run_batch(dut, &net_of_test.net, n, &counts, r.seed);
-  same_cycles(dut, &net_of_test.net, n, r.seed);
+  compare_cycles(&r, n, extreme);
 }
 
 /* While the streams never make it wait the model is exact, and so are each layer's busy cycles and the stalls. */
@@ -55,6 +60,18 @@ LOOP_TEST(cycles_are_those_of_the_model, 6)
 LOOP_TEST(cycles_of_a_sample_alone, 6)
 {
   for (uint64_t i = 0; i < 8; i++) check_cycles(5100 + (uint64_t)_i * 8 + i, 1, _i > 0);
+}
+
+/* C1's h comes once, and C2 has turns that fire nothing. */
+LOOP_TEST(cycles_of_radix, SF_T_MAX)
+{
+  for (uint64_t i = 0; i < 4; i++) {
+    random_source r = {5200 + (uint64_t)_i * 4 + i, 0};
+    random_net_make(&net_of_test, &r, true);
+    net_of_test.net.mode = FX_RADIX, net_of_test.net.steps = _i + 1;
+    random_net_limit(&net_of_test.net);
+    compare_cycles(&r, i % 2 ? BATCH : 1, true);
+  }
 }
 
 LOOP_TEST(extreme_nets, 25)
