@@ -139,8 +139,7 @@ static inline void oracle_colour(const oracle *o, int step, const dual *current,
   oracle_multiply(o, SF_P_C3, 0, o->t->model.config.hidden, s, j);
   oracle_bias(o, SF_P_C3_BIAS, j);
   for (int a = 0; a < 3; a++)
-    colour[a] = along ? logistic(j[a])
-                      : charged_by(o, step, leak(o, 4), step ? before[a] : 0, logistic(j[a]));
+    colour[a] = along ? logistic(j[a]) : charged_by(o, step, leak(o, 4), step ? before[a] : 0, logistic(j[a]));
 }
 
 static inline bool oracle_waits(const oracle *o)

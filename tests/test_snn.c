@@ -19,8 +19,8 @@ TEST(plif_by_hand)
   ck_assert_float_eq(sf_plif_charge(SF_RADIX, 1, 0.25f, 0.4f, 0.8f), 0.8f);
 }
 
-/* The spikes of a radix neuron are the first binary digits of its current over twice the threshold, cut; below 0 there are
- * none, beyond the range all. So a shorter train is the beginning of a longer one. */
+/* The spikes of a radix neuron are the first binary digits of its current over twice the threshold, cut; below 0 there
+ * are none, beyond the range all. So a shorter train is the beginning of a longer one. */
 TEST(radix_spikes_are_binary_digits)
 {
   for (int steps = 1; steps <= 8; steps++)
@@ -231,7 +231,9 @@ TEST(a_prefix_alone_is_the_same)
       memset(ds, 0, sizeof ds), memset(dc, 0, sizeof dc);
       for (int l = 0; l < SF_BLOCK; l++) ds[(steps - 1) * SF_BLOCK + l] = test_random((uint64_t)l);
       for (int l = 0; l < 3 * SF_BLOCK; l++) dc[(steps - 1) * 3 * SF_BLOCK + l] = test_random(1u << 20 | (uint64_t)l);
-      OWNED(rig) whole = rig_make(SF_NET_SNN, SF_RADIX, HIDDEN, steps), r = rig_make(SF_NET_SNN, SF_RADIX, HIDDEN, steps);
+      OWNED(rig)
+      whole = rig_make(SF_NET_SNN, SF_RADIX, HIDDEN, steps),
+      r = rig_make(SF_NET_SNN, SF_RADIX, HIDDEN, steps);
       rig_forward(&whole, kernels, 1);
       r.block->from = steps - 1;
       rig_forward(&r, kernels, 1);

@@ -51,12 +51,12 @@ typedef struct sf_ray_state {
 } sf_ray_state;
 
 /* What the forward pass of one block leaves: prefix outputs, and the membranes before fire for backward. */
-/* Radix mode: i and j are what the spikes of each prefix add up to; m1[0] is the current of D1, m3 and m4 those of C1 and
- * C2 in each prefix; s3 is not used. */
+/* Radix mode: i and j are what the spikes of each prefix add up to; m1[0] is the current of D1, m3 and m4 those of C1
+ * and C2 in each prefix; s3 is not used. */
 typedef struct sf_block {
   int lanes; /* that hold samples: the others are not charged */
-  int from;  /* radix mode: the first prefix that is wanted, 0 for that of one step. Those before it are not written, and
-                their gradients not read */
+  int from; /* radix mode: the first prefix that is wanted, 0 for that of one step. Those before it are not written, and
+               their gradients not read */
   float f[2 * 16 * SF_BLOCK], sh[SF_DIR_FEATURES * SF_BLOCK];
   float i[SF_T_MAX][SF_DENSITY_OUT * SF_BLOCK], j[SF_T_MAX][4 * SF_BLOCK];
   float sigma[SF_T_MAX][SF_BLOCK], colour[SF_T_MAX][3 * SF_BLOCK]; /* prefixes 1..T */

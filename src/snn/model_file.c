@@ -106,10 +106,11 @@ static sf_status load_config(const sf_tensors *set, sf_config *c)
   config_numbers(c, number_of);
   SF_TRY(load_numbers(set, number_of, CONFIG_NUMBERS));
   if (!strcmp(version, "1") && c->mode == SF_RADIX && c->net == SF_NET_SNN) /* mode 3 was another neuron there */
-    return sf_fail(SF_E_UNSUPPORTED,
-                   "%s: its neurons are the weighted ones of an earlier release, which this program does not have: train "
-                   "the model anew",
-                   set->path);
+    return sf_fail(
+        SF_E_UNSUPPORTED,
+        "%s: its neurons are the weighted ones of an earlier release, which this program does not have: train "
+        "the model anew",
+        set->path);
   if (sf_tensors_meta(set, "backbone")) SF_TRY(meta_int(set, "backbone", &c->backbone));
   if (c->backbone < 0 || c->backbone >= SF_FIELDS)
     return sf_fail(SF_E_RANGE, "%s: model config: backbone = %d is outside 0..%d", set->path, c->backbone,

@@ -166,6 +166,5 @@ void sf_net_sample(const sf_model *model, const float *in, const float *sh, int 
     run_steps(&x, steps, sigma, colour, trace);
     return;
   }
-  for (int t = 0; t < steps; t++)
-    run_prefix(&x, t + 1, sigma + t, colour + 3 * t, t + 1 == steps ? trace : NULL);
+  for (int t = 0; t < steps; t++) run_prefix(&x, t + 1, sigma + t, colour + 3 * t, t + 1 == steps ? trace : NULL);
 }

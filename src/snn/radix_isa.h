@@ -1,6 +1,6 @@
 /* Radix mode: a layer waits for all digits of its inputs, so it needs one product, whatever the steps (docs/model.md).
- * Every prefix is a pass of its own. A block keeps the currents of D1 in m1[0], of C1 and C2 in m3 and m4 of the prefix.
- * Oracle: net.c. Included by kernels_isa.c only. */
+ * Every prefix is a pass of its own. A block keeps the currents of D1 in m1[0], of C1 and C2 in m3 and m4 of the
+ * prefix. Oracle: net.c. Included by kernels_isa.c only. */
 #ifndef SF_SNN_RADIX_ISA_H
 #define SF_SNN_RADIX_ISA_H
 #include "snn/backward_isa.h"
@@ -35,8 +35,9 @@ static inline vf least(vf a, vf b)
 #endif
 }
 
-/* What the spikes of `steps` steps are worth: worth[rows][B]. The digits that a neuron finds one by one (sf_plif_charge)
- * are the number cut; where theta is no power of two, rounding may choose the next one at a multiple of the last digit. */
+/* What the spikes of `steps` steps are worth: worth[rows][B]. The digits that a neuron finds one by one
+ * (sf_plif_charge) are the number cut; where theta is no power of two, rounding may choose the next one at a multiple
+ * of the last digit. */
 static inline void digits(float theta, int steps, int rows, const float *restrict current, float *restrict worth)
 {
   const float levels = (float)(1 << steps), last = 1.0f / levels;
@@ -102,16 +103,16 @@ static void digits_backward(const sf_net_view *net, int layer, int steps, int ro
 
 /* A layer's current = init + w in, and what its spikes are worth, as words of rows. */
 static void waiting_layer(const sf_net_view *net, int index, int steps, const uint32_t *w, int pairs, const word *in,
-                          const float *init, float *current, word *worth)
+                          const float *init, float *current, uint32_t *worth)
 {
-  float tile[LAYER_ROWS * B];
+  float own[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
-    if (w)
-      gemm(operands(w) + m * pairs, pairs, n, pairs, in, B, B, init ? init + m * B : NULL, B, current + m * B, B);
+    float *tile = own;
+    if (PAIR == 1) tile = floats(worth + m * B);
+    if (w) gemm(operands(w) + m * pairs, pairs, n, pairs, in, B, B, init ? init + m * B : NULL, B, current + m * B, B);
     digits(net->theta[index], steps, n, current + m * B, tile);
-    const word *from = row_words(tile, n, (uint32_t *)(worth + m / PAIR * B));
-    if (PAIR == 1) memcpy(worth + m * B, from, (size_t)n * B * sizeof *from);
+    row_words(tile, n, worth + m / PAIR * B);
   }
 }
 
@@ -135,7 +136,7 @@ static void radix_density_prefix(const sf_net_words *n, sf_block *x, int p, sf_n
 {
   const sf_net_view *net = &n->view;
   const int pairs = net->hidden / PAIR;
-  waiting_layer(net, 0, p + 1, NULL, 0, NULL, NULL, x->m1[0], words(w->spikes));
+  waiting_layer(net, 0, p + 1, NULL, 0, NULL, NULL, x->m1[0], w->spikes);
   gemm(operands(n->w2), pairs, SF_DENSITY_OUT, pairs, words(w->spikes), B, B, NULL, 0, x->i[p], B);
   exponential(B, x->i[p], x->sigma[p]);
 }
@@ -148,9 +149,9 @@ static void radix_colour_prefix(const sf_net_words *n, sf_block *x, int p, int k
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden, pairs = hidden / PAIR, at = slot(p, keep);
   float b3[4 * B];
-  waiting_layer(net, 1, p + 1, w3, pairs3, in, base, x->m3[at], words(w->spikes));
+  waiting_layer(net, 1, p + 1, w3, pairs3, in, base, x->m3[at], w->spikes);
   waiting_layer(net, 2, p + 1, n->w4, pairs, words(w->spikes), bias_digits(bias2, hidden, p + 1, w->currents),
-                x->m4[at], words(w->rows));
+                x->m4[at], w->rows);
   gemm(operands(n->w5), pairs, 4, pairs, words(w->rows), B, B, bias_digits(bias3, 4, p + 1, b3), B, x->j[p], B);
   sigmoid(3 * B, x->j[p], x->colour[p]);
 }
@@ -181,15 +182,15 @@ static void radix_forward(const sf_net_words *n, sf_block *x, int steps, int kee
 /* Words of lanes of what a layer's spikes are worth, transposed for add_outer. */
 static const word *worth_lanes(const sf_net_view *net, int layer, int steps, const float *current, sf_net_scratch *w)
 {
-  float tile[LAYER_ROWS * B];
-  word *to = words(w->spikes);
+  float own[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
+    float *tile = own;
+    if (PAIR == 1) tile = floats(w->spikes + m * B);
     digits(net->theta[layer], steps, n, current + m * B, tile);
-    const word *from = lane_words(tile, n, (uint32_t *)(to + m * BW));
-    if (PAIR == 1) memcpy(to + m * BW, from, (size_t)n * BW * sizeof *from);
+    lane_words(tile, n, w->spikes + m * BW);
   }
-  transpose(to, net->hidden, BW, words(w->t), net->hidden);
+  transpose(operands(w->spikes), net->hidden, BW, words(w->t), net->hidden);
   return operands(w->t);
 }
 
@@ -207,7 +208,8 @@ static void waiting_backward(const sf_net_view *net, int index, int steps, const
   float own[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
-    float *tile = PAIR == 1 && out.rows ? floats(out.rows + m * B) : own;
+    float *tile = own;
+    if (PAIR == 1 && out.rows) tile = floats(out.rows + m * B);
     gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
     digits_backward(net, index, steps, n, current + m * B, fired, tile);
     if (out.sum) add_to(out.sum + m * B, tile, n * B);

@@ -139,7 +139,8 @@ void sf_count_spikes(const sf_trainer *t, int first, int steps, const sf_block *
     const float *const membrane[3] = {b->m1[s], b->m3[s], b->m4[s]};
     for (int l = first; l < 3; l++) g->spikes[l] += at_threshold(membrane[l], c->hidden, lanes, c->theta[l]);
   }
-  for (int l = first; l < 3 && !c->along && !radix; l++) g->fired[l] += at_any_step(b, l, steps, c->hidden, lanes, c->theta[l]);
+  for (int l = first; l < 3 && !c->along && !radix; l++)
+    g->fired[l] += at_any_step(b, l, steps, c->hidden, lanes, c->theta[l]);
   g->neurons += (double)steps * c->hidden * lanes;
   g->lanes += lanes;
 }
