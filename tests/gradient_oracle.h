@@ -161,10 +161,9 @@ static inline void oracle_wait(const oracle *o, int spiking, int steps, const du
   dual s[SF_LANES], worth[SF_LANES] = {0};
   for (int t = 0; t < steps; t++) {
     oracle_fire(o, spiking, t, 0, current, l, s);
-    for (int n = 0; n < o->t->model.config.hidden; n++) worth[n] += s[n] * pow(0.5, t + 1);
+    for (int n = 0; n < o->t->model.config.hidden; n++) worth[n] += s[n] * pow(2, steps - 1 - t) / (pow(2, steps) - 1);
   }
   if (bias < SF_P_COUNT) oracle_bias(o, bias, out);
-  for (int64_t r = 0; r < o->t->model.param[id].shape[0]; r++) out[r] *= 1 - pow(0.5, steps);
   oracle_multiply(o, id, 0, o->t->model.config.hidden, worth, out);
 }
 

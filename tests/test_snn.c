@@ -31,10 +31,10 @@ TEST(radix_spikes_are_binary_digits)
         v = sf_plif_charge(SF_RADIX, t, 0, v, current);
         const float spike = v >= theta ? 1 : 0;
         v -= spike * theta;
-        worth += spike * sf_digit(t);
+        worth += spike * sf_digit(t, steps);
       }
-      const float levels = (float)(1 << steps), cut = floorf(current / (2 * theta) * levels) / levels;
-      ck_assert_float_eq(worth, part < 0 ? 0 : part >= 1 ? sf_all_digits(steps) : cut);
+      const float levels = (float)(1 << steps), cut = floorf(current / (2 * theta) * levels) / (levels - 1);
+      ck_assert_float_eq_tol(worth, part < 0 ? 0 : part >= 1 ? 1 : cut, 1e-6f); /* a sum of digits that are rounded */
     }
 }
 

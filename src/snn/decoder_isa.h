@@ -198,12 +198,10 @@ static void decoder_backward(const sf_decoder_words *n, sf_decoder_block *d, int
   memset(w->leak, 0, sizeof w->leak);
   if (charged(v) && !is_radix(v)) count_fired(v, &d->net, 1, steps, w);
   for (int p = d->net.from; p < steps && is_radix(v); p++) {
-    float gj[4 * B], room[B], of_c2[SF_LANES * B];
-    const float *fired = charged_lanes(v, &d->net, p + 1 == steps, room), all = sf_all_digits(p + 1);
-    memset(of_c2, 0, plane);
-    radix_output_backward(net, &d->net, p, fired, dcolour, gj, of_c2, &grad->net, w);
-    for (int i = 0; i < hidden * B; i++) w->sum1[i] += all * of_c2[i];
-    for (int i = 0; i < 4 * B; i++) gsum[i] += all * gj[i];
+    float gj[4 * B], room[B];
+    const float *fired = charged_lanes(v, &d->net, p + 1 == steps, room);
+    radix_output_backward(net, &d->net, p, fired, dcolour, gj, w->sum1, &grad->net, w);
+    add_to(gsum, gj, 4 * B);
     waiting_backward(v, 1, p + 1, net->w4t, hidden / PAIR, words(w->rows), d->net.m3[p], fired,
                      (waiting_out){w->sum3, NULL, NULL});
   }

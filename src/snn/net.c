@@ -137,7 +137,7 @@ static void run_layer(nets *x, int layer, int steps, const float *current, const
     fire(&x->n[layer], x->hidden, t, current, s, trace, traced[layer]);
     if (bias < SF_P_COUNT) begin(x->model, bias, d->n_out, i);
     accumulate(d, s, i);
-    for (int o = 0; o < d->n_out; o++) out[o] += sf_digit(t) * i[o];
+    for (int o = 0; o < d->n_out; o++) out[o] += sf_digit(t, steps) * i[o];
     if (!trace || to == 3) continue;
     memcpy(trace->current[to][t], i, (size_t)d->n_out * sizeof *i);
     memcpy(trace->membrane[to][t], out, (to == 1 ? 1 : (size_t)d->n_out) * sizeof *out);

@@ -17,20 +17,14 @@ static inline float sf_plif_charge(sf_input_mode mode, int t, float k, float v, 
   return v + (i - v) * k;
 }
 
-/* Radix mode: what a spike of step t is worth, the binary digit 2^-(t+1). */
-static inline float sf_digit(int t)
+/* Radix mode: what a spike of step t of `steps` is worth, its binary digit; all of them are worth 1. */
+static inline float sf_digit(int t, int steps)
 {
-  return 1.0f / (float)(2 << t);
+  return (float)(1 << (steps - 1 - t)) / (float)((1 << steps) - 1);
 }
 
-/* What a train of spikes at every one of `steps` steps is worth, a bias for one. */
-static inline float sf_all_digits(int steps)
-{
-  return 1 - 1.0f / (float)(1 << steps);
-}
-
-/* h as the accelerator sees it: current >> SF_H_SHIFT. Currents are multiples of step >> SF_H_SHIFT, in radix mode of
- * that over 2^digits, but for their rounding, which half of that keeps from deciding. digits: 0 in the other modes. */
+/* h as the accelerator sees it: current >> SF_H_SHIFT, in radix mode with a current rounded to 2^-digits, in the other
+ * modes (digits 0) with an integer one. The half of that is for its rounding, which must not decide there. */
 static inline float sf_round_h(float h, float step, int digits)
 {
   return step * floorf(h / step + 0.5f / (float)(1 << (SF_H_SHIFT + digits)));

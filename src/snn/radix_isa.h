@@ -10,6 +10,12 @@ static inline bool is_radix(const sf_net_view *net)
   return net->mode == SF_RADIX && !net->relu;
 }
 
+/* What one digit of the last step is worth: products with numbers are times this. */
+static inline float last_digit(int steps)
+{
+  return sf_digit(steps - 1, steps);
+}
+
 /* The largest integer up to x, 0 <= x < 2^22. */
 static inline vf floor_of(vf x)
 {
@@ -35,16 +41,16 @@ static inline vf least(vf a, vf b)
 #endif
 }
 
-/* What the spikes of `steps` steps are worth: worth[rows][B]. The digits that a neuron finds one by one
- * (sf_plif_charge) are the number cut; where theta is no power of two, rounding may choose the next one at a multiple
- * of the last digit. */
-static inline void digits(float theta, int steps, int rows, const float *restrict current, float *restrict worth)
+/* The spikes of `steps` steps as the number that they are the digits of, 0 .. 2^steps - 1: number[rows][B]. The digits
+ * that a neuron finds one by one (sf_plif_charge) are the number cut; where theta is no power of two, rounding may
+ * choose the next one at a multiple of the last digit. */
+static inline void digits(float theta, int steps, int rows, const float *restrict current, float *restrict number)
 {
-  const float levels = (float)(1 << steps), last = 1.0f / levels;
+  const float levels = (float)(1 << steps);
   const vf most = (vf){0} + (levels - 1), scale = (vf){0} + levels / (2 * theta);
   for (int i = 0; i < rows * B; i += VL) {
     const vf x = load(current + i) * scale;
-    store(worth + i, last * floor_of(least((vf)((vi)x & (x > 0)), most)));
+    store(number + i, floor_of(least((vf)((vi)x & (x > 0)), most)));
   }
 }
 
@@ -64,11 +70,11 @@ static inline __attribute__((always_inline)) void digits_backward_of(const sf_ne
       v = 2.0f * (v - (vf)((v >= theta) & (vi)theta));
     }
     if (fired) count += load(fired + i % B);
-    const vf worth = load(g + i);
+    const vf last = last_digit(steps) * load(g + i); /* the other steps' gradients are exact multiples */
     vf carry = {0}, gh = {0};
 #pragma GCC unroll 8
     for (int t = steps - 1; t >= 0; t--) {
-      vf gs = sf_digit(t) * worth;
+      vf gs = (float)(1 << (steps - 1 - t)) * last;
       if (fired) gs += (vf)((count == (vf)((h[t] >= theta) & (vi)one)) & (vi)charge);
       gh = (gs - theta * carry) * surrogate(h[t] - theta) + carry;
       carry = 2.0f * gh;
@@ -101,28 +107,29 @@ static void digits_backward(const sf_net_view *net, int layer, int steps, int ro
 #undef OF
 }
 
-/* A layer's current = init + w in, and what its spikes are worth, as words of rows. */
+/* out[rows][B] = init + last_digit times products with numbers, which stand in out. init NULL: 0. */
+static void scale_products(int steps, int rows, const float *restrict init, float *restrict out)
+{
+  const float worth = last_digit(steps);
+  for (int i = 0; i < rows * B; i++) out[i] = (init ? init[i] : 0.0f) + worth * out[i];
+}
+
+/* A layer's current, and its spikes' numbers as words of rows. w: the current is init + w in, of what `in` is in
+ * numbers of `digits` digits, or, for 0, in values. NULL: it is there. */
 static void waiting_layer(const sf_net_view *net, int index, int steps, const uint32_t *w, int pairs, const word *in,
-                          const float *init, float *current, uint32_t *worth)
+                          int in_digits, const float *init, float *current, uint32_t *number)
 {
   float own[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
     float *tile = own;
-    if (PAIR == 1) tile = floats(worth + m * B);
-    if (w) gemm(operands(w) + m * pairs, pairs, n, pairs, in, B, B, init ? init + m * B : NULL, B, current + m * B, B);
+    const float *const from = init ? init + m * B : NULL;
+    if (PAIR == 1) tile = floats(number + m * B);
+    if (w) gemm(operands(w) + m * pairs, pairs, n, pairs, in, B, B, in_digits ? NULL : from, B, current + m * B, B);
+    if (in_digits) scale_products(in_digits, n, from, current + m * B);
     digits(net->theta[index], steps, n, current + m * B, tile);
-    row_words(tile, n, worth + m / PAIR * B);
+    row_words(tile, n, number + m / PAIR * B);
   }
-}
-
-/* room[rows][B]: all digits of a bias; NULL without one. */
-static const float *bias_digits(const float *bias, int rows, int steps, float *room)
-{
-  const float all = sf_all_digits(steps);
-  if (!bias) return NULL;
-  for (int i = 0; i < rows * B; i++) room[i] = all * bias[i];
-  return room;
 }
 
 /* D1's current to x->m1[0]. */
@@ -136,8 +143,9 @@ static void radix_density_prefix(const sf_net_words *n, sf_block *x, int p, sf_n
 {
   const sf_net_view *net = &n->view;
   const int pairs = net->hidden / PAIR;
-  waiting_layer(net, 0, p + 1, NULL, 0, NULL, NULL, x->m1[0], w->spikes);
+  waiting_layer(net, 0, p + 1, NULL, 0, NULL, 0, NULL, x->m1[0], w->spikes);
   gemm(operands(n->w2), pairs, SF_DENSITY_OUT, pairs, words(w->spikes), B, B, NULL, 0, x->i[p], B);
+  scale_products(p + 1, SF_DENSITY_OUT, NULL, x->i[p]);
   exponential(B, x->i[p], x->sigma[p]);
 }
 
@@ -148,11 +156,10 @@ static void radix_colour_prefix(const sf_net_words *n, sf_block *x, int p, int k
 {
   const sf_net_view *net = &n->view;
   const int hidden = net->hidden, pairs = hidden / PAIR, at = slot(p, keep);
-  float b3[4 * B];
-  waiting_layer(net, 1, p + 1, w3, pairs3, in, base, x->m3[at], w->spikes);
-  waiting_layer(net, 2, p + 1, n->w4, pairs, words(w->spikes), bias_digits(bias2, hidden, p + 1, w->currents),
-                x->m4[at], w->rows);
-  gemm(operands(n->w5), pairs, 4, pairs, words(w->rows), B, B, bias_digits(bias3, 4, p + 1, b3), B, x->j[p], B);
+  waiting_layer(net, 1, p + 1, w3, pairs3, in, 0, base, x->m3[at], w->spikes);
+  waiting_layer(net, 2, p + 1, n->w4, pairs, words(w->spikes), p + 1, bias2, x->m4[at], w->rows);
+  gemm(operands(n->w5), pairs, 4, pairs, words(w->rows), B, B, NULL, 0, x->j[p], B);
+  scale_products(p + 1, 4, bias3, x->j[p]);
   sigmoid(3 * B, x->j[p], x->colour[p]);
 }
 
@@ -179,7 +186,7 @@ static void radix_forward(const sf_net_words *n, sf_block *x, int steps, int kee
   tiles_end();
 }
 
-/* Words of lanes of what a layer's spikes are worth, transposed for add_outer. */
+/* Words of lanes of what a layer's spikes are worth, transposed for add_outer. bfloat16 rounds it, as gradients. */
 static const word *worth_lanes(const sf_net_view *net, int layer, int steps, const float *current, sf_net_scratch *w)
 {
   float own[LAYER_ROWS * B];
@@ -188,6 +195,7 @@ static const word *worth_lanes(const sf_net_view *net, int layer, int steps, con
     float *tile = own;
     if (PAIR == 1) tile = floats(w->spikes + m * B);
     digits(net->theta[layer], steps, n, current + m * B, tile);
+    scale_products(steps, n, NULL, tile);
     lane_words(tile, n, w->spikes + m * BW);
   }
   transpose(operands(w->spikes), net->hidden, BW, words(w->t), net->hidden);
