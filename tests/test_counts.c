@@ -86,6 +86,26 @@ TEST(ledger_equals_pricing_by_hand)
   ck_assert_uint_eq(l.ann_hoisted_fj, 2 * 349600 - 12 * 4600);
 }
 
+/* Radix has multiplied h once as it is; as spikes it would be there at both steps. C2's sums are no firing. */
+TEST(radix_ledger_by_hand)
+{
+  fx_net net = small_net();
+  fx_counts c = {0};
+  sf_ledger l;
+  net.mode = FX_RADIX;
+  sf_recount_sample(&net, small_spikes, true, &c);
+  expect(&c, FX_C1, SF_EVENT_MAC, 20, 0);
+  expect(&c, FX_D2, SF_EVENT_UPDATES, 3, 3);
+  expect(&c, FX_C2, SF_EVENT_UPDATES, 10, 5);
+  expect(&c, FX_C2, SF_EVENT_STATE_R, 15, 15);
+  expect(&c, FX_C2, SF_EVENT_STATE_W, 30, 15);
+  expect(&c, FX_C3, SF_EVENT_SPECIAL, 0, 3);
+  ck_ok(sf_ledger_make(&net, &c, &l));
+  ck_assert_uint_eq(l.spiking_fj, 32 * 4600 + 40 * 900);
+  ck_assert_uint_eq(l.h_once_fj, l.spiking_fj);
+  ck_assert_uint_eq(l.h_spikes_fj, 24 * 4600 + (40 + 8) * 900);
+}
+
 TEST(nothing_counted_costs_nothing)
 {
   fx_net net = small_net();

@@ -183,7 +183,7 @@ LOOP_TEST(tensorf_gives_the_spikes_of_the_oracle, 2)
   free_graph(&shared);
 }
 
-/* And a net whose steps are the samples of a ray, and one whose spikes are weighted. */
+/* And a net whose steps are the samples of a ray, and one of mode radix. */
 LOOP_TEST(the_relu_twin_is_refused, 3)
 {
   OWNED(sf_model) m = test_model(_i ? SF_NET_SNN : SF_NET_ANN, _i == 2 ? SF_RADIX : SF_HYBRID, 32, 1, 0.5f);
@@ -193,15 +193,15 @@ LOOP_TEST(the_relu_twin_is_refused, 3)
   ck_assert_ptr_null(fopen(in("twin.nir"), "r"));
 }
 
-TEST(a_scene_of_weighted_spikes_is_refused)
+TEST(a_scene_of_radix_is_refused)
 {
   static random_net n;
   random_source r = {78, 0};
   random_net_make(&n, &r, false);
   fx_scene scene = {.net = n.net};
   scene.net.mode = FX_RADIX;
-  ck_assert_int_eq(sf_nir_write_scene(in("weighted.nir"), &scene).code, SF_E_UNSUPPORTED);
-  ck_assert_ptr_null(fopen(in("weighted.nir"), "r"));
+  ck_assert_int_eq(sf_nir_write_scene(in("radix.nir"), &scene).code, SF_E_UNSUPPORTED);
+  ck_assert_ptr_null(fopen(in("radix.nir"), "r"));
 }
 
 TEST(same_scene_same_bytes)

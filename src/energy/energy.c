@@ -63,20 +63,20 @@ static uint64_t scale_round(uint64_t a, uint64_t b, uint64_t c)
   return c == 0 ? 0 : (uint64_t)(((u128)a * b + c / 2) / c);
 }
 
-static uint64_t all_spikes(const fx_counts *counts)
+static uint64_t spiking_neurons(const fx_counts *counts, int event)
 {
   uint64_t sum = 0;
-  for (int s = 0; s < FX_SPIKING; s++)
-    sum = sf_add_u64(sum, layer_total(&counts->layer[fx_spiking_layers[s]], SF_EVENT_SPIKES));
+  for (int s = 0; s < FX_SPIKING; s++) sum = sf_add_u64(sum, layer_total(&counts->layer[fx_spiking_layers[s]], event));
   return sum;
 }
 
-/* If all neurons fired at all steps. */
-static uint64_t most_spikes(const fx_net *net, uint64_t samples)
+/* Updates that may fire. Radix: not those at which C2 adds up all sums but the last. */
+static uint64_t firing_updates(const fx_net *net, const fx_counts *counts)
 {
-  uint64_t neurons = 0;
-  for (int s = 0; s < FX_SPIKING; s++) neurons += (uint64_t)net->layer[fx_spiking_layers[s]].n_out;
-  return sf_multiply_u64(neurons * (uint64_t)net->steps, samples);
+  const uint64_t updates = spiking_neurons(counts, SF_EVENT_UPDATES);
+  const uint64_t sums = (uint64_t)net->layer[FX_C2].n_out * (uint64_t)(net->steps - 1);
+  const uint64_t others = net->mode == FX_RADIX ? sf_multiply_u64(sums, counts->samples) : 0;
+  return updates > others ? updates - others : 0;
 }
 
 sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *ledger)
@@ -87,14 +87,14 @@ sf_status sf_ledger_make(const fx_net *net, const fx_counts *counts, sf_ledger *
   if (d_mac > c1_mac || net->steps < 1)
     return sf_fail(SF_E_RANGE, "audit: C1 counts %llu MACs, fewer than the direction's %llu",
                    (unsigned long long)c1_mac, (unsigned long long)d_mac);
-  const uint64_t h_times = net->mode == FX_RADIX ? 1 : (uint64_t)net->steps;
-  uint64_t h_mac = fx_net_constants_per_sample(net) ? 0 : c1_mac - d_mac; /* of all times */
-  uint64_t h_sop =
-      scale_round(h_mac / h_times * (uint64_t)net->steps, all_spikes(counts), most_spikes(net, counts->samples));
+  const bool radix = net->mode == FX_RADIX; /* which multiplies h once, not at every step */
+  const uint64_t h_mac = fx_net_constants_per_sample(net) ? 0 : c1_mac - d_mac, steps = (uint64_t)net->steps;
+  const uint64_t h_once = radix ? h_mac : h_mac / steps, h_steps = radix ? sf_multiply_u64(h_mac, steps) : h_mac;
+  const uint64_t h_sop = scale_round(h_steps, spiking_neurons(counts, SF_EVENT_SPIKES), firing_updates(net, counts));
 
   *ledger = (sf_ledger){.mac_fj = sf_multiply_u64(mac, SF_MAC_FJ), .sop_fj = sf_multiply_u64(sop, SF_SOP_FJ)};
   ledger->spiking_fj = sf_energy_fj(counts);
-  ledger->h_once_fj = sf_add_u64(sf_multiply_u64(mac - h_mac + h_mac / h_times, SF_MAC_FJ), ledger->sop_fj);
+  ledger->h_once_fj = sf_add_u64(sf_multiply_u64(mac - h_mac + h_once, SF_MAC_FJ), ledger->sop_fj);
   ledger->h_spikes_fj =
       sf_add_u64(sf_multiply_u64(mac - h_mac, SF_MAC_FJ), sf_multiply_u64(sf_add_u64(sop, h_sop), SF_SOP_FJ));
   ledger->ann_fj = sf_energy_ann_fj(net, counts->samples);

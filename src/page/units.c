@@ -59,7 +59,7 @@ static void basis(FILE *out, const sf_page *page, int row, int part)
     fprintf(out, "%s words of 64 bits; ", html_count(text, sf_row_accesses(&net->layer[row])));
     memory(out, t, sf_weights_size(&net->layer[row]));
   } else if (part == SF_PART_STATE) {
-    fprintf(out, "register file, %d bits; twin 8", fx_layer_table[row].state_bits);
+    fprintf(out, "register file, %d bits; twin 8", fx_layer_state_bits(row, net->mode));
   } else if (part == SF_PART_PRODUCT) {
     fprintf(out,
             row == SF_ROW_RAY ? "compositing of a sample: six products, six sums" : "17 \xc3\x97 8 bits, sum of 24");

@@ -10,19 +10,40 @@ static inline bool is_radix(const sf_net_view *net)
   return net->mode == SF_RADIX && !net->relu;
 }
 
-/* What the spikes of `steps` steps are worth: worth[rows][B]. */
+/* The largest integer up to x, 0 <= x < 2^22. */
+static inline vf floor_of(vf x)
+{
+#if defined(__AVX512F__)
+  return (vf)_mm512_roundscale_ps((__m512)x, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+#elif defined(__AVX2__)
+  return (vf)_mm256_floor_ps((__m256)x);
+#else
+  const vf one = (vf){0} + 1.0f, near = (x + 8388608.0f) - 8388608.0f;
+  return near - (vf)((near > x) & (vi)one);
+#endif
+}
+
+static inline vf least(vf a, vf b)
+{
+#if defined(__AVX512F__)
+  return (vf)_mm512_min_ps((__m512)a, (__m512)b);
+#elif defined(__AVX2__)
+  return (vf)_mm256_min_ps((__m256)a, (__m256)b);
+#else
+  const vi s = a < b;
+  return (vf)(((vi)a & s) | ((vi)b & ~s));
+#endif
+}
+
+/* What the spikes of `steps` steps are worth: worth[rows][B]. The digits that a neuron finds one by one (sf_plif_charge)
+ * are the number cut; where theta is no power of two, rounding may choose the next one at a multiple of the last digit. */
 static inline void digits(float theta, int steps, int rows, const float *restrict current, float *restrict worth)
 {
-  const vf at = (vf){0} + theta;
+  const float levels = (float)(1 << steps), last = 1.0f / levels;
+  const vf most = (vf){0} + (levels - 1), scale = (vf){0} + levels / (2 * theta);
   for (int i = 0; i < rows * B; i += VL) {
-    vf v = load(current + i), sum = {0};
-    for (int t = 0; t < steps; t++) {
-      const vi s = v >= at;
-      const vf digit = (vf){0} + sf_digit(t);
-      sum += (vf)(s & (vi)digit);
-      v = 2.0f * (v - (vf)(s & (vi)at));
-    }
-    store(worth + i, sum);
+    const vf x = load(current + i) * scale;
+    store(worth + i, last * floor_of(least((vf)((vi)x & (x > 0)), most)));
   }
 }
 
@@ -35,15 +56,16 @@ static inline __attribute__((always_inline)) void digits_backward_of(const sf_ne
   const vf theta = (vf){0} + net->theta[layer], one = (vf){0} + 1.0f, charge = (vf){0} + net->charge[layer];
   for (int i = 0; i < rows * B; i += VL) {
     vf h[SF_T_MAX], v = load(current + i), count = {0};
+#pragma GCC unroll 8
     for (int t = 0; t < steps; t++) {
-      const vi s = v >= theta;
       h[t] = v;
-      if (fired) count += (vf)(s & (vi)one);
-      v = 2.0f * (v - (vf)(s & (vi)theta));
+      if (fired) count += (vf)((v >= theta) & (vi)one);
+      v = 2.0f * (v - (vf)((v >= theta) & (vi)theta));
     }
     if (fired) count += load(fired + i % B);
     const vf worth = load(g + i);
     vf carry = {0}, gh = {0};
+#pragma GCC unroll 8
     for (int t = steps - 1; t >= 0; t--) {
       vf gs = sf_digit(t) * worth;
       if (fired) gs += (vf)((count == (vf)((h[t] >= theta) & (vi)one)) & (vi)charge);

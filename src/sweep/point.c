@@ -186,8 +186,8 @@ static int state_bits(const bench *b, int layer)
 {
   const sf_quant_widths *w = &b->report.widths;
   const int64_t rows = (int64_t)fx_layer_rows(&b->scene.net.layer[layer]) * ((1 << (w->weight_bits - 1)) - 1);
-  return !fx_layer_fires(layer)         ? fx_layer_table[layer].state_bits
-         : fx_layer_reads_spikes(layer) ? signed_bits(rows << SF_AC_FRAC)
+  return !fx_layer_fires(layer)         ? fx_layer_state_bits(layer, b->scene.net.mode)
+         : fx_layer_reads_spikes(layer) ? signed_bits(rows << fx_layer_frac(layer, b->scene.net.mode))
                                         : signed_bits(rows * ((1 << (w->feature_bits - 1)) - 1));
 }
 
@@ -200,7 +200,8 @@ static double traffic_bits(const bench *b)
     for (int t = 0; t < b->scene.net.steps; t++) {
       const fx_layer_counts *c = &b->counts.layer[l];
       bits += (double)c->weight[t] * w->weight_bits;
-      bits += (double)c->updates[t] * state_bits(b, l) * (t > 0 ? 2 : 1); /* written, and read after the first step */
+      const double read = c->state_w[t] ? (double)c->state_r[t] / (double)c->state_w[t] : 0;
+      bits += (double)c->updates[t] * state_bits(b, l) * (1 + read); /* written, and read but for the first time */
     }
   return bits;
 }

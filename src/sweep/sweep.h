@@ -40,7 +40,7 @@ typedef enum {
   SF_POINT_TRAFFIC, /* bits of weights, grid entries and states moved per frame */
   SF_POINT_CLIPPED_FEATURES,
   SF_POINT_CLIPPED_DENSITY, /* saturations of D2: harmless, alpha saturates long before */
-  SF_POINT_CLIPPED_STATES,  /* of D1, C1, C2, C3: unexpected but in no-decay mode and of weighted spikes */
+  SF_POINT_CLIPPED_STATES,  /* of D1, C1, C2, C3: unexpected but in modes no-decay and radix */
   SF_POINT_SAMPLES,         /* through the nets */
   SF_POINT_SPEED,           /* samples/s of the fixed-point core, grid and marching included */
   SF_POINT_FIGURES
