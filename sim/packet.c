@@ -13,7 +13,7 @@ sf_net_blob sf_dut_blob(const fx_net *net)
                       .sigmoid_in = {colour.mul, colour.shift, colour.bias}};
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &net->layer[l];
-    blob.layer[l] = (sf_layer_blob){layer->n_in, layer->n_out, layer->k, layer->theta, layer->bias, layer->w};
+    blob.layer[l] = (sf_layer_blob){layer->n_in, layer->n_out, layer->k, fx_net_theta(net, l), layer->bias, layer->w};
   }
   return blob;
 }

@@ -184,11 +184,14 @@ static inline void naive_updates(naive_net *n, int l, int t, int states, int byt
 static inline void naive_fire(naive_net *n, int l, int t, const int64_t *current, int64_t gain, bool *spike)
 {
   const fx_layer *layer = &n->net->layer[l];
+  const int64_t parts = ((int64_t)1 << n->net->steps) - 1; /* of 2^T: C2's current in radix mode */
+  const int64_t theta =
+      n->net->mode == FX_RADIX && l == FX_C2 ? naive_round(layer->theta * parts, n->net->steps) : layer->theta;
   for (int o = 0; o < layer->n_out; o++) {
     const int64_t in = n->net->mode == FX_RADIX && t > 0 ? 0 : current[o] * gain;
     const int64_t exact = naive_charge(n, n->v[l][o], in, layer->k, t), u = naive_clamp(exact, -8388608, 8388607);
-    spike[o] = u >= layer->theta;
-    n->v[l][o] = spike[o] ? u - layer->theta : u;
+    spike[o] = u >= theta;
+    n->v[l][o] = spike[o] ? u - theta : u;
     n->counts->saturated[l] += u != exact;
     n->trace->current[l][t][o] = (int32_t)current[o];
     n->trace->membrane[l][t][o] = (int32_t)u;
@@ -240,21 +243,17 @@ static inline int64_t naive_integrate(naive_net *n, int l, int t, int64_t acc, i
 }
 
 /* What a table gives for a current of 2^-digits LSB. */
-static inline int64_t naive_exp(naive_net *n, int64_t current, int digits)
+static inline int64_t naive_exp(naive_net *n, int64_t current)
 {
-  const fx_scale *s = &n->net->exp_in;
-  const int more = s->shift + digits > 31 ? s->shift + digits - 31 : 0;
-  const fx_scale scale = {(int32_t)naive_round(s->mul, more), s->shift + digits - more, s->bias};
+  const fx_scale scale = fx_net_scale(n->net, &n->net->exp_in);
   const int64_t y = naive_scale(current, &scale, 131072);
   n->counts->saturated[FX_D2] += y >= 65536;
   return fx_exp2((int32_t)y);
 }
 
-static inline int64_t naive_sigmoid(const naive_net *n, int64_t current, int digits)
+static inline int64_t naive_sigmoid(const naive_net *n, int64_t current)
 {
-  const fx_scale *s = &n->net->sigmoid_in;
-  const int more = s->shift + digits > 31 ? s->shift + digits - 31 : 0;
-  const fx_scale scale = {(int32_t)naive_round(s->mul, more), s->shift + digits - more, s->bias};
+  const fx_scale scale = fx_net_scale(n->net, &n->net->sigmoid_in);
   return fx_sigmoid((int32_t)naive_scale(current, &scale, 32768));
 }
 
@@ -268,7 +267,7 @@ static inline void naive_density(naive_net *n, int t, const int64_t *d1, int64_t
   naive_synapses(n, FX_D2, t, spike, current);
   for (int o = 0; o < d2->n_out; o++) n->trace->current[FX_D2][t][o] = (int32_t)current[o];
   n->counts->layer[FX_D2].special[t]++;
-  n->sigma = naive_integrate(n, FX_D2, t, n->sigma, naive_exp(n, current[0], 0), ((int64_t)1 << 28) - 1);
+  n->sigma = naive_integrate(n, FX_D2, t, n->sigma, naive_exp(n, current[0]), ((int64_t)1 << 28) - 1);
   n->trace->membrane[FX_D2][t][0] = (int32_t)n->sigma;
   for (int j = 0; j + 1 < d2->n_out; j++)
     h[j] = naive_round(current[1 + j] * 2 - ((1 << SF_H_SHIFT) - 1), SF_H_SHIFT + 1); /* floor */
@@ -301,7 +300,7 @@ static inline void naive_colour(naive_net *n, int t, const int64_t *base, const 
   naive_updates(n, FX_C2, t, l[FX_C2].n_out, 3, t == 0);
   naive_synapses(n, FX_C3, t, spike2, current);
   for (int o = 0; o < 3; o++) {
-    const int64_t s = naive_sigmoid(n, current[o], 0);
+    const int64_t s = naive_sigmoid(n, current[o]);
     n->counts->layer[FX_C3].special[t]++;
     n->colour[o] = naive_integrate(n, FX_C3, t, n->colour[o], s, ((int64_t)1 << 20) - 1);
     n->trace->current[FX_C3][t][o] = (int32_t)current[o];
@@ -352,11 +351,16 @@ static inline void naive_prefixes(naive_net *n, int l, int output)
   }
 }
 
+static inline int64_t naive_floor(int64_t x, int64_t by)
+{
+  return x >= 0 ? x / by : -((-x + by - 1) / by);
+}
+
 static inline void naive_radix_density(naive_net *n, const int64_t *d1, int64_t *h)
 {
   const fx_layer *l = n->net->layer;
   const int steps = n->net->steps;
-  const int64_t whole = (int64_t)1 << (SF_H_SHIFT + steps);
+  const int64_t parts = ((int64_t)1 << steps) - 1, half = (int64_t)1 << 14, whole = (int64_t)1 << (SF_H_SHIFT + steps);
   int64_t number[SF_LANES], sum[SF_LANES];
   naive_numbers(n, FX_D1, d1, 1, number);
   naive_digits(n, FX_D2, number, sum);
@@ -366,9 +370,12 @@ static inline void naive_radix_density(naive_net *n, const int64_t *d1, int64_t 
     naive_updates(n, FX_D2, t, l[FX_D2].n_out, 4, t == 0);
   }
   n->counts->layer[FX_D2].special[steps - 1]++;
-  n->sigma = naive_exp(n, sum[0], steps);
-  for (int j = 0; j + 1 < l[FX_D2].n_out; j++) /* floor */
-    h[j] = sum[1 + j] >= 0 ? sum[1 + j] / whole : -((-sum[1 + j] + whole - 1) / whole);
+  n->sigma = naive_exp(n, sum[0]);
+  for (int j = 0; j + 1 < l[FX_D2].n_out; j++) { /* the mean in 2^-steps: a product with 2^(15 + T) / (2^T - 1) */
+    const int64_t factor = (2 * ((int64_t)32768 << steps) + parts) / (2 * parts);
+    const int64_t mean = naive_floor(sum[1 + j] * factor + half, 2 * half);
+    h[j] = naive_floor(mean, whole);
+  }
 }
 
 static inline void naive_radix_colour(naive_net *n, const int64_t *base, const int64_t *h)
@@ -390,7 +397,7 @@ static inline void naive_radix_colour(naive_net *n, const int64_t *base, const i
   for (int o = 0; o < 3; o++) {
     naive_prefixes(n, FX_C3, o);
     n->counts->layer[FX_C3].special[steps - 1]++;
-    n->colour[o] = naive_sigmoid(n, sum[o], steps);
+    n->colour[o] = naive_sigmoid(n, sum[o]);
   }
 }
 

@@ -336,7 +336,7 @@ static inline void expect_digits(const hard *h, const hard_seen *seen, int varia
     if (current == 0) ck_assert_int_eq(digits, 0);
   }
   const fx_scale *s = &h->scene.net.exp_in;
-  const double y = sum * ldexp(s->mul, -s->shift - steps), near = 1 + fabs(y) / 65536;
+  const double y = sum * ldexp(s->mul, -s->shift) / ((1 << steps) - 1), near = 1 + fabs(y) / 65536;
   ck_assert_uint_ge(seen->out.sigma, fx_exp2((int32_t)floor(y - near)));
   ck_assert_uint_le(seen->out.sigma, fx_exp2((int32_t)ceil(y + near)));
   for (int t = 0; t < steps; t++) ck_assert_uint_eq(seen->counts.layer[FX_D2].special[t], t == steps - 1);

@@ -122,7 +122,8 @@ static void check_neuron(int32_t v, int32_t current, const fx_layer *layer, int3
   for (int o = 0; o < SF_LANES; o += 37) ck_assert(lane[o] == step.v && membrane[o] == step.membrane);
 }
 
-/* The scale of radix is 2^-T of the other modes', to half an LSB of its factor where the shift is at its end. */
+/* The scale of radix is that of a current over 2^T - 1: to half an LSB of its factor, which has 16 bits unless the
+ * shift is at its end. */
 TEST(scale_of_radix)
 {
   for (uint64_t i = 0; i < 4000; i++) {
@@ -130,16 +131,51 @@ TEST(scale_of_radix)
     const fx_scale in = {(int32_t)fixture_pick(9, 0, i, 0, largest), (int32_t)fixture_pick(9, 1, i, 0, 31), (int32_t)i};
     const fx_net net = {.mode = FX_RADIX, .steps = 1 + (int)(i % SF_T_MAX)};
     const fx_scale out = fx_net_scale(&net, &in);
-    const double exact = ldexp(in.mul, -in.shift - net.steps), got = ldexp(out.mul, -out.shift);
+    const double exact = ldexp(in.mul, -in.shift) / ((1 << net.steps) - 1);
     ck_assert_int_eq(out.bias, in.bias);
     ck_assert(out.mul >= 0 && out.mul <= 65535 && out.shift >= in.shift && out.shift <= 31);
-    ck_assert(out.shift == 31 ? fabs(got - exact) <= ldexp(0.5, -31) : got == exact && out.mul == in.mul);
+    ck_assert(fabs(ldexp(out.mul, -out.shift) - exact) <= ldexp(0.5, -out.shift));
+    ck_assert_msg(out.mul >= 32767 || out.shift == 31, "%d / 2^%d for %g", out.mul, out.shift, exact);
     for (int mode = FX_HYBRID; mode < FX_RADIX; mode++) {
       const fx_net other = {.mode = mode, .steps = net.steps};
       const fx_scale same = fx_net_scale(&other, &in);
       ck_assert_mem_eq(&same, &in, sizeof in);
     }
   }
+}
+
+/* C2's threshold in radix mode is the share 1 - 2^-T of theta, rounded; every other layer's and mode's is theta. */
+TEST(thresholds_that_a_driver_programs)
+{
+  for (int mode = FX_HYBRID; mode <= FX_RADIX; mode++)
+    for (int steps = 1; steps <= SF_T_MAX; steps++)
+      for (int32_t theta = 1; theta < 1 << 22; theta = theta * 5 / 4 + 1) {
+        fx_net net = {.mode = mode, .steps = steps};
+        for (int l = 0; l < SF_LAYERS; l++) net.layer[l].theta = theta;
+        for (int l = 0; l < SF_LAYERS; l++) {
+          const double share = mode == FX_RADIX && l == FX_C2 ? 1 - ldexp(1, -steps) : 1;
+          ck_assert_int_eq(fx_net_theta(&net, l), (int32_t)floor(share * theta + 0.5));
+        }
+      }
+}
+
+/* h is the mean of a sum of all steps, down by H_SHIFT, within 1/32 of its LSB; exactly where the mean is a whole
+ * number of them, and so small that the factor's own rounding, at most 2^-16 of it, is below half of 2^-T of a
+ * current's LSB. */
+TEST(h_of_a_sum)
+{
+  for (int steps = 1; steps <= SF_T_MAX; steps++)
+    for (uint64_t i = 0; i < 20000; i++) {
+      const int parts = (1 << steps) - 1;
+      const int32_t sum = (int32_t)fixture_pick(10, steps, i, -16256 * parts, 16256 * parts),
+                    got = fx_weighed_h(sum, steps);
+      const double exact = ldexp((double)sum / parts, -SF_H_SHIFT);
+      ck_assert_msg(got <= exact + 1.0 / 32 + ldexp(1, -SF_H_SHIFT) && got > exact - 1 - 1.0 / 32,
+                    "%d steps, %d: %d for %g", steps, sum, got, exact);
+      const int32_t small = 1 << (15 - SF_H_SHIFT - steps), most = small < 100 ? small : 100;
+      const int32_t whole = (int32_t)(i % (uint64_t)(2 * most + 1)) - most;
+      ck_assert_int_eq(fx_weighed_h(whole * parts << SF_H_SHIFT, steps), whole);
+    }
 }
 
 /* The spikes of a current are the first T binary digits of I / (2 theta), cut; rails do not change them. */

@@ -13,7 +13,7 @@ TEST(info_says_what_the_scene_is)
   for (int l = 0; l < SF_LAYERS; l++) {
     ck_assert_int_eq(info.inputs[l], core.net.layer[l].n_in);
     ck_assert_int_eq(info.outputs[l], core.net.layer[l].n_out);
-    ck_assert_int_eq(info.theta[l], core.net.layer[l].theta);
+    ck_assert_int_eq(info.theta[l], fx_net_theta(&core.net, l));
     ck_assert_int_eq(info.leak_q12[l], core.net.layer[l].k);
   }
   ck_assert_int_eq(info.mode, SPIKEFIELD_HYBRID);

@@ -240,7 +240,7 @@ LOOP_TEST(one_large_weight_does_not_coarsen_the_others, 2)
     ck_assert_int_eq(report.layer[FX_C3].clipped > 0, i);
   }
   printf("C3: units %.4f, %.4f, colours off by %.5f, %.5f\n", unit[0], unit[1], error[0], error[1]);
-  ck_assert_double_lt(error[1], _i ? 0.025 : 0.005);
+  ck_assert_double_lt(error[1], _i ? 0.03 : 0.005);
 }
 
 /* Every D2 and C3 current through the tables against exp and the logistic function of the current it stands for: the

@@ -140,7 +140,7 @@ static uint32_t write_blob(uint8_t *block, const fx_net *net)
   uint32_t at = SF_BLOB_WORDS * 4;
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &net->layer[l];
-    const int32_t field[SF_BLOB_LAYER_WORDS] = {layer->n_in, layer->n_out, layer->k, layer->theta, layer->bias};
+    const int32_t field[SF_BLOB_LAYER_WORDS] = {layer->n_in, layer->n_out, layer->k, fx_net_theta(net, l), layer->bias};
     for (int i = 0; i < SF_BLOB_LAYER_WORDS; i++)
       put_word(block, SF_BLOB_HEADER_WORDS + SF_BLOB_LAYER_WORDS * l + i, field[i]);
     memcpy(block + at, layer->w, (size_t)fx_layer_rows(layer) * SF_LANES);

@@ -54,7 +54,7 @@ static void ck_group(expectation *e, int l, int t, char **rest)
   for (int n = 0; n < e->net->layer[l].n_out; n++) {
     const bool fired = e->trace.spikes[l][t][n / 64] >> (n % 64) & 1;
     const long v = strtol(*rest, rest, 10);
-    const int32_t expected = e->trace.membrane[l][t][n] - (fired ? e->net->layer[l].theta : 0);
+    const int32_t expected = e->trace.membrane[l][t][n] - (fired ? fx_net_theta(e->net, l) : 0);
     if (*(*rest)++ != ',' || v != expected)
       ck_abort_msg("%s.%d at %llu: %ld instead of %d", fx_layer_name(l), n, e->now, v, expected);
     if (!fired) continue;

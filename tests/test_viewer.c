@@ -173,7 +173,7 @@ LOOP_TEST(a_story_is_the_ray, 2)
       weights += p->weight, spikes += p->cost.spikes, decoded += p->decoded;
       ck_assert(k == 0 || (p->at > p[-1].at && p->left <= p[-1].left));
       for (int t = 0; t < scene->net.steps && p->decoded; t++) /* a neuron fires where its membrane is above */
-        ck_assert_int_eq(p->membrane[t] >= scene->net.layer[FX_C2].theta, p->spikes[FX_C2][t][0] >> 3 & 1);
+        ck_assert_int_eq(p->membrane[t] >= fx_net_theta(&scene->net, FX_C2), p->spikes[FX_C2][t][0] >> 3 & 1);
     }
     ck_assert_uint_eq(weights, pixel.weight_sum);
     ck_assert_uint_eq(decoded, counts.samples);

@@ -60,7 +60,7 @@ static sf_status scene_json(const char *path, const fx_net *net, cJSON *json)
     cJSON_AddNumberToObject(layer, "n_in", net->layer[l].n_in);
     cJSON_AddNumberToObject(layer, "n_out", net->layer[l].n_out);
     cJSON_AddNumberToObject(layer, "k", net->layer[l].k);
-    cJSON_AddNumberToObject(layer, "theta", net->layer[l].theta);
+    cJSON_AddNumberToObject(layer, "theta", fx_net_theta(net, l));
     cJSON_AddItemToArray(layers, layer);
   }
   return sf_ok();

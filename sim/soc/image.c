@@ -76,7 +76,7 @@ static void put_net(uint8_t *to, const fx_net *net)
   uint8_t *weights = to + SF_BLOB_WORDS * 4;
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &net->layer[l];
-    const int32_t field[SF_BLOB_LAYER_WORDS] = {layer->n_in, layer->n_out, layer->k, layer->theta, layer->bias};
+    const int32_t field[SF_BLOB_LAYER_WORDS] = {layer->n_in, layer->n_out, layer->k, fx_net_theta(net, l), layer->bias};
     put_words(to + 4 * (SF_BLOB_HEADER_WORDS + l * SF_BLOB_LAYER_WORDS), field, SF_BLOB_LAYER_WORDS);
     const size_t size = (size_t)fx_layer_rows(layer) * SF_LANES;
     memcpy(weights, layer->w, size);

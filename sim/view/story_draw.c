@@ -135,7 +135,7 @@ static sf_status draw_neuron(const sf_story *s, int sample, cJSON *to)
   const int n = fill_neuron(s, sample, &t, &mark);
   snprintf(title, sizeof title, "Neuron %d of %s", s->neuron, fx_layer_name(s->layer));
   if (fires)
-    snprintf(membrane, sizeof membrane, "Membrane, threshold %" PRId32, s->scene->net.layer[s->layer].theta);
+    snprintf(membrane, sizeof membrane, "Membrane, threshold %" PRId32, fx_net_theta(&s->scene->net, s->layer));
   else
     snprintf(membrane, sizeof membrane, "Accumulator");
   const html_axis axis = {t.x, n, "sample, with its steps", mark};

@@ -58,8 +58,10 @@ static void set_scalars(sf_exact *e)
     const bool real = sf_exact_is(e, SF_EXACT_LEAK);
     if (e->scene->net.layer[l].n_out == 0) continue;
     e->k[l] = real ? ldexp(1 / (1 + exp(-(double)leak[l])), SF_LEAK_FRAC) : e->scene->net.layer[l].k;
-    e->theta[l] = real ? ldexp(theta[l] / e->scene->units.current_scale[l], fx_layer_frac(l, e->scene->net.mode))
-                       : (double)e->scene->net.layer[l].theta;
+    const double share = l == FX_C2 && e->scene->net.mode == FX_RADIX ? 1 - ldexp(1, -e->scene->net.steps) : 1;
+    e->theta[l] = real
+                      ? share * ldexp(theta[l] / e->scene->units.current_scale[l], fx_layer_frac(l, e->scene->net.mode))
+                      : (double)fx_net_theta(&e->scene->net, l);
   }
 }
 
@@ -167,11 +169,11 @@ static double table_argument(double current, const fx_scale *scale, int bits)
   return sf_exact_clamp(sf_exact_round(ldexp(current * scale->mul, -scale->shift)) + scale->bias, -high, high - 1);
 }
 
-/* What one LSB of a table's current is worth: radix asks for the sum of all digits. */
+/* What one LSB of a table's current is worth: radix asks for the sum of all digits, 2^T - 1 currents. */
 static double current_lsb(const sf_exact *e, int layer)
 {
   const fx_net *net = &e->scene->net;
-  return ldexp(e->scene->units.current_scale[layer], net->mode == FX_RADIX ? -net->steps : 0);
+  return e->scene->units.current_scale[layer] / (net->mode == FX_RADIX ? (1 << net->steps) - 1 : 1);
 }
 
 static double density(const sf_exact *e, double current)
@@ -207,13 +209,16 @@ void sf_exact_direction(const sf_exact *e, const double *x, double *base)
 }
 
 /* The inputs h of C1, of D2's currents; an LSB of h is 2^shift of them. */
-static void add_h(const sf_exact *e, const double *d2, int shift, double *current)
+/* digits: of radix, whose mean is rounded to as many; else 0. */
+static void add_h(const sf_exact *e, const double *d2, int digits, double *current)
 {
   const fx_net *net = &e->scene->net;
   for (int j = 0; j < fx_net_h(net); j++) {
-    const double h = ldexp(d2[1 + j], -shift);
+    const double mean = d2[1 + j] / (digits ? (1 << digits) - 1 : 1);
     const bool real = sf_exact_is(e, SF_EXACT_H) && !e->model->scales.weight_bits;
-    add_row(e, FX_C1, fx_net_constants(net) + j, real ? h : floor(h), current);
+    const double kept =
+        digits ? fx_weighed_h((int32_t)sf_exact_round(d2[1 + j]), digits) : floor(ldexp(mean, -SF_H_SHIFT));
+    add_row(e, FX_C1, fx_net_constants(net) + j, real ? ldexp(mean, -SF_H_SHIFT) : kept, current);
   }
 }
 
@@ -227,7 +232,7 @@ static void run_steps(const sf_exact *e, const double *d1, const double *base, s
       fire(e, FX_D1, t, v[0], d1, out);
       add_spikes(e, FX_D2, out->spikes[FX_D1][t], d2);
       out->sigma = integrate(e, out->sigma, density(e, d2[0]), FX_D2, t, SF_SIGMA_BITS);
-      add_h(e, d2, SF_H_SHIFT, current);
+      add_h(e, d2, 0, current);
     }
     fire(e, FX_C1, t, v[1], current, out);
     add_spikes(e, FX_C2, out->spikes[FX_C1][t], current);
@@ -240,7 +245,8 @@ static void run_steps(const sf_exact *e, const double *d1, const double *base, s
 
 /* ---- radix: a layer begins when all steps of the one before are there ---- */
 
-/* The spikes that a layer's currents make, and what the next layer makes of them: sum[o], in 2^-steps of its LSB. */
+/* The spikes that a layer's currents make, and what the next layer makes of them: sum[o], the weighed sum of all steps.
+ */
 static void run_layer(const sf_exact *e, int l, const double *current, double *sum, sf_exact_out *out)
 {
   double step[SF_LANES], v[SF_LANES] = {0};
@@ -260,7 +266,7 @@ static void run_layers(const sf_exact *e, const double *d1, const double *base, 
   if (!fx_net_decodes(net)) {
     run_layer(e, FX_D1, d1, sum, out);
     out->sigma = density(e, sum[0]);
-    add_h(e, sum, SF_H_SHIFT + net->steps, current);
+    add_h(e, sum, net->steps, current);
   }
   run_layer(e, FX_C1, current, sum, out);
   for (int o = 0; o < SF_LANES; o++) current[o] = ldexp(sum[o], -net->steps);

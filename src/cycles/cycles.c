@@ -139,7 +139,7 @@ void sf_tick(sf_cycle_model *m)
   sf_tick_fed(m, s, &was, C2, was.neuron.load_c2, was.neuron.released);
   sf_tick_fed(m, s, &was, C3, c3_load, c3_last);
   s->h_taken += d2_begins;
-  s->h_full += was.read_d2.way[2] && was.read_d2.way_last[2];
+  sf_tick_h(m, s, &was, was.read_d2.way[2] && was.read_d2.way_last[2]);
   const bool taken = !was.out.second || !m->takes || m->takes(m->user, m->clock);
   tick_readout(m, s, &was, d2_begins, c3_begins, taken, &m->totals);
   const bool busy[SF_LAYERS] = {s->mac.busy[0], s->sum[D2].busy, s->mac.busy[1], s->sum[C2].busy, s->sum[C3].busy};

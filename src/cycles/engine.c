@@ -21,6 +21,18 @@ bool sf_engine_idle(const state *s)
   return !busy;
 }
 
+/* h of a sample whose sums are complete: in radix mode behind its means, a value per cycle and three on the way. */
+void sf_tick_h(const sf_cycle_model *m, state *s, const state *was, bool complete)
+{
+  enum { VALUES = 15 };
+  const bool works = was->h_waiting > 0, last = works && was->h_at == VALUES - 1;
+  s->h_full += m->radix ? was->h_way[2] : complete;
+  s->h_waiting += m->radix && complete;
+  s->h_waiting -= last;
+  if (works) s->h_at = last ? 0 : was->h_at + 1;
+  s->h_way[0] = last, s->h_way[1] = was->h_way[0], s->h_way[2] = was->h_way[1];
+}
+
 static int job_of(const sf_cycle_model *m, const state *was)
 {
   const values *v = &was->mac;

@@ -91,6 +91,8 @@ typedef struct state {
   sums sum[FED];
   reader read_d2, read_c3;
   uint32_t h_taken, h_full;
+  uint32_t h_waiting, h_at; /* radix: sums of samples whose means are not begun or not all begun, and how many are */
+  bool h_way[3];            /* a sample's last mean is on its way */
   readout read;
   output out;
 } state;
@@ -124,6 +126,7 @@ static inline const sf_cycle_sample *sample(const sf_cycle_model *m, uint32_t nu
 
 /* True where D1, or a decoder's C1, reads its inputs for the last time. load: sums of D1 or C1 are loaded. */
 bool sf_tick_values(const sf_cycle_model *m, state *s, const state *was, bool load);
+void sf_tick_h(const sf_cycle_model *m, state *s, const state *was, bool complete); /* complete: the sums of a sample */
 /* Whose neurons step: the layer nearest to the output goes first. True where sums of D1 or C1 are loaded. */
 bool sf_tick_neurons(const sf_cycle_model *m, state *s, const state *was);
 /* Layer l (D2, C2, C3) and the spikes before it. load, release: of its sums. */

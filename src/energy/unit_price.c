@@ -103,6 +103,14 @@ static uint64_t neuron_fj(const pricing *p, const fx_net *net, int l)
   return products(p, 1, bits, K_BITS) + adds(p, fx_layer_fires(l) ? 4 : 2, bits);
 }
 
+/* What comes with the density's special function in radix mode: each h is a sum times 1 / (2^T - 1). */
+static uint64_t means_fj(const pricing *p, const fx_net *net, int l)
+{
+  const int bits = fx_layer_state_bits(FX_D2, net->mode);
+  if (net->mode != FX_RADIX || l != FX_D2) return 0;
+  return products(p, fx_net_h(net), bits, SCALE_BITS + 1) + adds(p, fx_net_h(net), bits);
+}
+
 enum { ENTRY_BITS = 8, CELL_BITS = 9, CORNER_BITS = 17, FIELD_SUM_BITS = 24, ADDRESS_BITS = 32, LATTICE_BITS = 12 };
 
 /* A level: the position times its scale, per axis; weights of the corners, four products along x and y, four along z;
@@ -162,7 +170,8 @@ static uint64_t layer_fj(const pricing *p, const fx_net *net, int ledger, int l,
     if (twin) return products(p, 1, TWIN_SUM_BITS, REQUANTISE_BITS) + adds(p, 1, TWIN_SUM_BITS);
     return neuron_fj(p, net, l);
   case SF_PART_SPECIAL:
-    return special_fj(p, twin ? TWIN_SUM_BITS : sf_sum_bits(layer, false), l == FX_D2 ? SF_SIGMA_BITS : SF_COLOUR_BITS);
+    return (twin ? 0 : means_fj(p, net, l)) +
+           special_fj(p, twin ? TWIN_SUM_BITS : sf_sum_bits(layer, false), l == FX_D2 ? SF_SIGMA_BITS : SF_COLOUR_BITS);
   default:
     return 0;
   }

@@ -279,15 +279,14 @@ static INLINE void c2_currents(const fx_words *words, bitmaps spikes, bool bias,
 static INLINE void d2_numbers(const fx_words *words, const fx_block *b, fx_scratch *s, int steps, int gang)
 {
   static const int32_t none[SF_OUT_MAX];
-  const __m128i shift = _mm_cvtsi32_si128(SF_H_SHIFT + steps);
   uint8_t x[GANG][SF_LANES];
   int32_t sum[GANG][SF_OUT_MAX];
   number_gang(b, 0, steps, gang, x);
   output_products(words->d2_quads, (const uint8_t(*)[SF_LANES])x, none, steps, sum);
   for (int k = 0; k < GANG; k++) {
     s->argument[0][0][gang + k] = sum[k][0];
-    for (int o = 0; o < SF_OUT_MAX; o += WIDTH)
-      v_store_narrow(&s->d2_current[0][gang + k][o], V(sra_epi32)(v_load(&sum[k][o]), shift));
+    for (int o = 1; o < SF_OUT_MAX; o++) sum[k][o] = fx_weighed_h(sum[k][o], steps);
+    for (int o = 0; o < SF_OUT_MAX; o += WIDTH) v_store_narrow(&s->d2_current[0][gang + k][o], v_load(&sum[k][o]));
   }
 }
 

@@ -103,9 +103,11 @@ static inline int fx_net_constants(const fx_net *net)
   return net->layer[FX_C1].n_in - fx_net_h(net);
 }
 
-/* exp_in or sigmoid_in for what its table is asked: a step's current, or of radix the sum of the currents of net->steps
- * steps (fx_weigh), whose LSB is worth 2^-steps of a current's. These are the numbers that a driver programs. */
+/* The numbers that a driver programs, which hang on the steps in radix mode: there a sum of all steps (fx_weigh) stands
+ * for 2^steps - 1 currents. The scale is exp_in or sigmoid_in for what its table is asked: a step's current, or that sum.
+ * The threshold is theta, but in C2, whose current is 1 - 2^-steps of the mean, as much of theta, rounded. */
 fx_scale fx_net_scale(const fx_net *net, const fx_scale *scale);
+int32_t fx_net_theta(const fx_net *net, int layer);
 
 /* The first layer that the net has. */
 static inline int fx_net_first_layer(const fx_net *net)
@@ -294,7 +296,7 @@ typedef struct fx_trace {
 static inline int32_t fx_membrane_left(const fx_net *net, const fx_trace *trace, int layer, int step, int n)
 {
   const bool fired = trace->spikes[layer][step][n / 64] >> n % 64 & 1;
-  return trace->membrane[layer][step][n] - (fired ? net->layer[layer].theta : 0);
+  return trace->membrane[layer][step][n] - (fired ? fx_net_theta(net, layer) : 0);
 }
 
 typedef struct fx_out {

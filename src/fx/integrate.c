@@ -1,5 +1,5 @@
 /* Leaky integrators of the output layers: no threshold, no reset.
- * Mirror: rtl/sf_integrate.sv (fx_integrate_*), rtl/sf_scale.sv (fx_*_argument)
+ * Mirror: rtl/sf_integrate.sv (fx_integrate_*), rtl/sf_scale.sv (fx_*_argument), rtl/sf_c1_inputs.sv (fx_weighed_h)
  *
  *   hybrid, first step    a = in
  *   hybrid, decay         a = a + rshift_round((in - a) * k, 12)     between a and in: exact
@@ -10,13 +10,33 @@
 #include "src/fx/round.h"
 #include "src/fx/nofloat.h"
 
-enum { SHIFT_MAX = 31 };
-
 fx_scale fx_net_scale(const fx_net *net, const fx_scale *scale)
 {
-  if (net->mode != FX_RADIX) return *scale;
-  const int shift = scale->shift + net->steps, beyond = shift > SHIFT_MAX ? shift - SHIFT_MAX : 0;
-  return (fx_scale){(int32_t)fx_rshift_round(scale->mul, beyond), shift - beyond, scale->bias};
+  const int64_t parts = (1 << net->steps) - 1;
+  fx_scale s = *scale;
+  if (net->mode != FX_RADIX) return s;
+  /* The finest shift that leaves the factor 16 bits. */
+  int64_t mul = (s.mul + parts / 2) / parts;
+  for (int more = 1; scale->shift + more <= 31; more++) {
+    const int64_t finer = (((int64_t)scale->mul << more) + parts / 2) / parts;
+    if (finer > 65535) break;
+    mul = finer, s.shift = scale->shift + more;
+  }
+  s.mul = (int32_t)mul;
+  return s;
+}
+
+int32_t fx_net_theta(const fx_net *net, int layer)
+{
+  const int64_t theta = net->layer[layer].theta;
+  if (net->mode != FX_RADIX || layer != FX_C2) return (int32_t)theta;
+  return (int32_t)fx_rshift_round(theta * ((1 << net->steps) - 1), net->steps);
+}
+
+int32_t fx_weighed_h(int32_t sum, int steps)
+{
+  static const int32_t mean_of[SF_T_MAX + 1] = {0, 65536, 43691, 37449, 34953, 33825, 33288, 33026, 32897};
+  return (int32_t)fx_rshift_round((int64_t)sum * mean_of[steps], 15) >> (SF_H_SHIFT + steps);
 }
 
 int32_t fx_exp2_argument(int32_t current, const fx_scale *scale)

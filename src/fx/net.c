@@ -39,9 +39,10 @@ static int strips(int n)
 
 static void fire(state *s, const fx_net *net, int l, int t, const int32_t *current, fx_trace *trace)
 {
-  const fx_layer *layer = &net->layer[l];
+  fx_layer layer = net->layer[l];
   int32_t *membrane = trace ? trace->membrane[l][t] : NULL;
-  s->events.saturated[l] += (uint64_t)fx_plif_layer(s->v[l], current, strips(layer->n_out), layer, net->mode, t == 0,
+  layer.theta = fx_net_theta(net, l);
+  s->events.saturated[l] += (uint64_t)fx_plif_layer(s->v[l], current, strips(layer.n_out), &layer, net->mode, t == 0,
                                                     s->events.spikes[l][t], membrane);
 }
 
@@ -161,7 +162,7 @@ static void radix_density(state *s, const fx_net *net, fx_trace *trace)
     if (trace) trace->membrane[FX_D2][t][0] = sum[0];
   }
   read_density(s, net, 0, sum[0]);
-  for (int j = 0; j < fx_net_h(net); j++) s->h[j] = (int16_t)(sum[1 + j] >> (SF_H_SHIFT + net->steps));
+  for (int j = 0; j < fx_net_h(net); j++) s->h[j] = (int16_t)(fx_weighed_h(sum[1 + j], net->steps));
 }
 
 /* C1; leaves C2's sum of all steps. */

@@ -38,7 +38,7 @@ typedef struct neurons {
 
 static INLINE neurons neurons_of(const fx_net *net, int layer, int mode, bool first)
 {
-  return (neurons){leak_of(net->layer[layer].k), v_set(net->layer[layer].theta), mode, first};
+  return (neurons){leak_of(net->layer[layer].k), v_set(fx_net_theta(net, layer)), mode, first};
 }
 
 static INLINE vec clamp_membrane(vec exact, uint32_t *saturated)

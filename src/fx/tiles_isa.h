@@ -131,14 +131,15 @@ static INLINE void density_layers(const fx_core *core, fx_block *b, fx_scratch *
     input_products(words->d1_twice[o / SIDE], ROW, true, s->x[0], SF_LANES, NULL, false, 1, s->sum);
     fire_layer(net, 0, mode, &c, o, 1, 0, b->n, b);
   }
-  const int blocks = blocks_of(net, mode), shift = SF_H_SHIFT + (mode == FX_RADIX ? net->steps : 0);
+  const int blocks = blocks_of(net, mode), shift = mode == FX_RADIX ? 0 : SF_H_SHIFT;
   input_rows(net, b, 0, mode, s->x);
   spike_products(words->d2_quads[0], ROW, (const uint8_t(*)[SF_LANES])s->x, NULL, blocks, s->sum);
   for (int t = 0; t < blocks; t++)
     for (int i = 0; i < b->n; i++) {
-      const vec current = v_load(s->sum[t * FX_BLOCK + i]);
-      s->argument[t][0][i] = s->sum[t * FX_BLOCK + i][0];
-      h_row(current, shift, s->x[t * FX_BLOCK + i]);
+      int32_t *const current = s->sum[t * FX_BLOCK + i];
+      s->argument[t][0][i] = current[0];
+      for (int o = 1; o < SF_OUT_MAX && mode == FX_RADIX; o++) current[o] = fx_weighed_h(current[o], net->steps);
+      h_row(v_load(current), shift, s->x[t * FX_BLOCK + i]);
     }
 }
 

@@ -58,4 +58,7 @@ static inline int32_t fx_weigh(int32_t sum, int32_t current)
 {
   return 2 * sum + current;
 }
+
+/* Radix: h of such a sum: its mean, rounded to 2^-steps of the current's LSB, then down by SF_H_SHIFT. */
+int32_t fx_weighed_h(int32_t sum, int steps);
 #endif

@@ -78,7 +78,7 @@ static void describe_net(const fx_net *net, spikefield_scene_info *info)
   for (int l = 0; l < SF_LAYERS; l++) {
     const fx_layer *layer = &net->layer[l];
     info->inputs[l] = layer->n_in, info->outputs[l] = layer->n_out;
-    info->theta[l] = layer->theta, info->leak_q12[l] = layer->k;
+    info->theta[l] = fx_net_theta(net, l), info->leak_q12[l] = layer->k;
     info->weight_bytes += (int64_t)fx_layer_rows(layer) * layer->n_out;
   }
   info->mode = (spikefield_mode)net->mode, info->steps = net->steps;

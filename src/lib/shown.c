@@ -18,7 +18,7 @@ int32_t lib_membrane(const fx_net *net, lib_spikes spikes, lib_membranes membran
 {
   if (neuron < 0 || neuron >= net->layer[layer].n_out) return 0;
   const bool fired = spikes[layer][step][neuron / 64] >> (neuron % 64) & 1;
-  return membrane[layer][step][neuron] - (fired ? net->layer[layer].theta : 0);
+  return membrane[layer][step][neuron] - (fired ? fx_net_theta(net, layer) : 0);
 }
 
 uint64_t lib_counter(const fx_counts *counts, int at)

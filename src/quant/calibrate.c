@@ -67,7 +67,7 @@ static void keep_digits(sf_calibration *c, const sizes *s, const sf_net_trace *t
         if (fx_layer_fires(l)) c->spikes[l][at] += (uint8_t)(value * (trace->spike[l][t][o] != 0));
         if (!fx_layer_fires(l)) c->target[l][at] += (float)value * trace->current[l][t][o];
         if (t == 0 && fx_layer_fires(l))
-          c->target[l][at] = trace->current[l][t][o] * (float)(fx_layer_reads_spikes(l) ? 2 * value : 1);
+          c->target[l][at] = trace->current[l][t][o] * (float)(fx_layer_reads_spikes(l) ? 2 * value - 1 : 1);
       }
 }
 

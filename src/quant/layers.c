@@ -1,5 +1,6 @@
 /* The layers of the net in the order of the data flow: each unit follows from the one before. A bias is the weight of
  * one more input, which is always active. */
+#include "src/fx/unit.h"
 #include "src/quant/internal.h"
 #include <math.h>
 #include <stdlib.h>
@@ -151,7 +152,7 @@ static double colour_error(const context *c, const int16_t *x, double unit)
   const fx_layer *to = &c->scene->net.layer[FX_C3];
   const sf_calibration *cal = c->calibration;
   const size_t inputs = (size_t)fx_layer_rows(to), n_out = (size_t)to->n_out;
-  const double whole = ldexp(1, -cal->digits);
+  const double whole = 1.0 / (cal->digits ? (1 << cal->digits) - 1 : 1);
   double error = 0;
   for (size_t row = 0; row < (size_t)rows_of(cal, FX_C3); row++)
     for (size_t o = 0; o < n_out; o++) {
@@ -255,8 +256,7 @@ static void colour_inputs(const context *c, const input_format *f, int16_t *x, d
 {
   const sf_calibration *cal = c->calibration;
   fx_layer *to = &c->scene->net.layer[FX_C1];
-  const int n = cal->constants, h = to->n_in - n, one = 1 << SF_H_SHIFT, all = one << cal->digits,
-            per_sample = cal->per_sample[FX_C1];
+  const int n = cal->constants, h = to->n_in - n, one = 1 << SF_H_SHIFT, per_sample = cal->per_sample[FX_C1];
   for (int i = 0; i < to->n_in; i++) lsb[i] = lsb_of(c, f, i);
   if (to->bias) {
     to->bias = c->settled ? (int32_t)lround(1 / (double)c->settled->lsb.bias) : bias_input(c, lsb);
@@ -267,8 +267,10 @@ static void colour_inputs(const context *c, const input_format *f, int16_t *x, d
     const float *current = h ? cal->target[FX_D2] + (size_t)row * (size_t)(h + 1) : NULL;
     int16_t *in = x + (size_t)row * (size_t)fx_layer_rows(to);
     for (int i = 0; i < n; i++) in[i] = to_input(nearbyint(constant[i] / lsb[i]), c->input_limit);
-    for (int j = 0; j < h; j++)
-      in[n + j] = to_input(floor(nearbyint(one * current[1 + j] / f->h) / all), c->input_limit);
+    for (int j = 0; j < h; j++) {
+      const int32_t lsbs = (int32_t)nearbyint(one * current[1 + j] / f->h);
+      in[n + j] = to_input(cal->digits ? fx_weighed_h(lsbs, cal->digits) : lsbs >> SF_H_SHIFT, c->input_limit);
+    }
     if (to->bias) in[to->n_in] = (int16_t)to->bias;
   }
 }
