@@ -69,16 +69,19 @@ module sf_c1_inputs (
       if (done_i) h_read_q <= !h_read_q;
     end
   end
-  // The sums so far; of a weighted sum the lowest bits are never needed.
+  // The sums so far, in the other modes 0; of a weighted sum the lowest bits are never needed.
   reg [23*15-1:0] sum_q;
   wire [24*15-1:0] sum;
   wire [KEPT*15-1:0] h_kept;
-  wire adds = radix_i && step_i != 3'd0;
+  wire over = !radix_i || clear_i || h_complete;
   genvar l;
   generate
     for (l = 0; l < 15; l = l + 1) begin : g_h
-      assign sum[24*l+:24] = 24'($signed(sums_i[16*l+:16])) + (adds ? {sum_q[23*l+:23], 1'b0} : 24'd0);
-      always_ff @(posedge clk_i) if (valid_i) sum_q[23*l+:23] <= sum[24*l+:23];
+      assign sum[24*l+:24] = 24'($signed(sums_i[16*l+:16])) + {sum_q[23*l+:23], 1'b0};
+      always_ff @(posedge clk_i) begin
+        if (over) sum_q[23*l+:23] <= 23'd0;
+        else if (valid_i) sum_q[23*l+:23] <= sum[24*l+:23];
+      end
       assign h_kept[KEPT*l+:KEPT] = sum[24*l+sf_arch_pkg::H_SHIFT+:KEPT];
     end
   endgenerate
@@ -89,11 +92,14 @@ module sf_c1_inputs (
     if (valid_i) h_q[{h_write_q, radix_i ? 3'd0 : step_i}] <= h_kept;
   end
   wire [KEPT*15-1:0] h_word = h_q[{h_read_q, h_step_i}];
-  reg signed [KEPT-1:0] h_value;
-  always_comb begin
-    h_value = {KEPT{1'b0}};
-    for (int i = 0; i < 15; i++) if (h_index_i == 4'(i)) h_value = h_word[KEPT*i+:KEPT];
-  end
+  wire [511:0] h_wide;  // at places that are a power of two apart
+  generate
+    for (l = 0; l < 15; l = l + 1) begin : g_wide
+      assign h_wide[32*l+:32] = {{(32 - KEPT) {1'b0}}, h_word[KEPT*l+:KEPT]};
+    end
+  endgenerate
+  assign h_wide[511:480] = 32'd0;
+  wire signed [KEPT-1:0] h_value = h_wide[{h_index_i, 5'd0}+:KEPT];
   assign h_o = 12'(h_value >>> shift_q);
   assign room_o = !h_taken_q[1];
   assign valid_o = h_full_q != 2'd0;
