@@ -71,15 +71,18 @@ module sf_c1_inputs (
       if (done_i) h_read_q <= !h_read_q;
     end
   end
-  // The sums so far.
+  // The sums so far, in the other modes 0.
   reg [23*15-1:0] sum_q;
   wire [24*15-1:0] sum;
-  wire adds = radix_i && step_i != 3'd0;
+  wire over = !radix_i || clear_i || sums_complete;
   genvar l;
   generate
     for (l = 0; l < 15; l = l + 1) begin : g_h
-      assign sum[24*l+:24] = 24'($signed(sums_i[16*l+:16])) + (adds ? {sum_q[23*l+:23], 1'b0} : 24'd0);
-      always_ff @(posedge clk_i) if (valid_i) sum_q[23*l+:23] <= sum[24*l+:23];
+      assign sum[24*l+:24] = 24'($signed(sums_i[16*l+:16])) + {sum_q[23*l+:23], 1'b0};
+      always_ff @(posedge clk_i) begin
+        if (over) sum_q[23*l+:23] <= 23'd0;
+        else if (valid_i) sum_q[23*l+:23] <= sum[24*l+:23];
+      end
     end
   endgenerate
   reg [24*15-1:0] h_q[0:15];  // 15 sums by {sample, step}
@@ -108,11 +111,14 @@ module sf_c1_inputs (
 
   wire [24*15-1:0] word = radix_i ? h_q[{mean_read_q, 3'd0}] : h_q[{h_read_q, h_step_i}];
   wire [3:0] index = radix_i ? at_q : h_index_i;
-  reg signed [23:0] value;
-  always_comb begin
-    value = 24'sd0;
-    for (int i = 0; i < 15; i++) if (index == 4'(i)) value = word[24*i+:24];
-  end
+  wire [511:0] wide;  // at places that are a power of two apart
+  generate
+    for (l = 0; l < 15; l = l + 1) begin : g_wide
+      assign wide[32*l+:32] = {8'd0, word[24*l+:24]};
+    end
+  endgenerate
+  assign wide[511:480] = 32'd0;
+  wire signed [23:0] value = wide[{index, 5'd0}+:24];
   reg signed [17:0] factor_q;  // 2^(15 + steps) / (2^steps - 1), rounded; does not change at work
   reg [3:0] shift_q;
   reg signed [23:0] value1_q;

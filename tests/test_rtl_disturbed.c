@@ -41,9 +41,10 @@ static void feed_cycle(sf_dut *dut, feed *f, random_source *r)
   dut->in.s_valid = false;
 }
 
-static sf_dut *begin(uint64_t seed)
+static sf_dut *begin(uint64_t seed, fx_input_mode mode)
 {
   typical(60);
+  net_of_test.net.mode = mode;
   return open_dut(&net_of_test.net, seed, 20);
 }
 
@@ -113,7 +114,7 @@ LOOP_TEST(a_hard_reset_is_enough, 2)
 LOOP_TEST(soft_reset_in_every_phase, SF_PHASES)
 {
   random_source r = {63, (uint64_t)_i << 32};
-  OWNED(sf_dut) *dut = begin(63);
+  OWNED(sf_dut) *dut = begin(63, FX_HYBRID);
   for (int trial = 0; trial < 3; trial++) {
     feed f = {.m_percent = 30};
     int cycle = 0;
@@ -134,11 +135,11 @@ LOOP_TEST(soft_reset_in_every_phase, SF_PHASES)
 }
 
 /* In every cycle of some samples: nothing of them comes out afterwards, and the net that is there goes on. */
-TEST(soft_reset_in_every_cycle)
+LOOP_TEST(soft_reset_in_every_cycle, 2)
 {
   enum { CYCLES = 420, SILENCE = 50 };
   random_source r = {64, 0};
-  OWNED(sf_dut) *dut = begin(64);
+  OWNED(sf_dut) *dut = begin(64, _i ? FX_RADIX : FX_HYBRID);
   dut->stall_percent = 0;
   for (int delay = 0; delay < CYCLES; delay++) {
     feed f = {.m_percent = 100};
@@ -213,7 +214,7 @@ static void send_rest(sf_dut *dut, feed *f, random_source *r)
 LOOP_TEST(snapshot_and_clear_at_work, 8)
 {
   random_source r = {64, (uint64_t)_i << 32};
-  OWNED(sf_dut) *dut = begin(64);
+  OWNED(sf_dut) *dut = begin(64, _i & 4 ? FX_RADIX : FX_HYBRID);
   feed f = {.m_percent = 80};
   const bool clear = _i & 1;
   for (int64_t cycle = draw(&r, 400, 1500); cycle > 0; cycle--) feed_cycle(dut, &f, &r);
