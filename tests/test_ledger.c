@@ -130,7 +130,7 @@ TEST(radix_asks_once_and_does_not_leak)
   ck_ok(make_ledgers(&tech, &net, &c, &small_traffic, radix));
   const uint64_t *const here = radix->part[SF_LEDGER_NEURON], *const other = l->part[SF_LEDGER_NEURON];
   const uint64_t field = 1 * (20 * 16 + 192 + 2 * 20 + 160); /* of the ray, not of the nets */
-  const uint64_t means = 2 * (24 * 17 + 24); /* of two h */
+  const uint64_t means = 2 * (24 * 17 + 24);                 /* of two h */
   ck_assert_uint_eq(2 * (here[SF_PART_SPECIAL] - field - means), other[SF_PART_SPECIAL] - field);
   static const bool differs[SF_PARTS] = {
       [SF_PART_MAC] = true, [SF_PART_STATE] = true, [SF_PART_NEURON] = true, [SF_PART_SPECIAL] = true};

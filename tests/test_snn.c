@@ -232,8 +232,7 @@ TEST(a_prefix_alone_is_the_same)
       for (int l = 0; l < SF_BLOCK; l++) ds[(steps - 1) * SF_BLOCK + l] = test_random((uint64_t)l);
       for (int l = 0; l < 3 * SF_BLOCK; l++) dc[(steps - 1) * 3 * SF_BLOCK + l] = test_random(1u << 20 | (uint64_t)l);
       OWNED(rig)
-      whole = rig_make(SF_NET_SNN, SF_RADIX, HIDDEN, steps),
-      r = rig_make(SF_NET_SNN, SF_RADIX, HIDDEN, steps);
+      whole = rig_make(SF_NET_SNN, SF_RADIX, HIDDEN, steps), r = rig_make(SF_NET_SNN, SF_RADIX, HIDDEN, steps);
       rig_forward(&whole, kernels, 1);
       r.block->from = steps - 1;
       rig_forward(&r, kernels, 1);

@@ -63,7 +63,7 @@ static outcome watch(sf_trainer *t, int layer, int most)
 }
 
 /* Faults of one layer: every weight times `factor`; where factor is 0, weights from `value` to twice that. A neuron of
- * weighted spikes doubles its membrane in every step, so a small current soon fires again, and is no such fault. */
+ * radix spikes doubles its membrane in every step, so a small current soon fires again, and is no such fault. */
 static const struct fault {
   sf_param_id id;
   int layer;

@@ -104,8 +104,8 @@ static inline int fx_net_constants(const fx_net *net)
 }
 
 /* The numbers that a driver programs, which hang on the steps in radix mode: there a sum of all steps (fx_weigh) stands
- * for 2^steps - 1 currents. The scale is exp_in or sigmoid_in for what its table is asked: a step's current, or that sum.
- * The threshold is theta, but in C2, whose current is 1 - 2^-steps of the mean, as much of theta, rounded. */
+ * for 2^steps - 1 currents. The scale is exp_in or sigmoid_in for what its table is asked: a step's current, or that
+ * sum. The threshold is theta, but in C2, whose current is 1 - 2^-steps of the mean, as much of theta, rounded. */
 fx_scale fx_net_scale(const fx_net *net, const fx_scale *scale);
 int32_t fx_net_theta(const fx_net *net, int layer);
 
