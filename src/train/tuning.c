@@ -5,10 +5,11 @@
 #include <math.h>
 #include <string.h>
 
-/* Thresholds are integers of the membrane: C2's has SF_AC_FRAC more bits than its current. */
+/* Thresholds are integers of the membrane: C2's has more bits than its current. */
 static void round_thresholds(sf_model *m)
 {
-  static const int layer[3] = {0, 2, 3}, frac[3] = {0, 0, SF_AC_FRAC};
+  static const int layer[3] = {0, 2, 3};
+  const int frac[3] = {0, 0, m->config.mode == SF_RADIX ? SF_T_MAX : SF_AC_FRAC};
   for (int i = 0; i < 3; i++) {
     if (!sf_model_has(m, sf_layer_weights[layer[i]])) continue;
     const float lsb = ldexpf(m->scales.lsb.current[layer[i]], -frac[i]);

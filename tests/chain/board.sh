@@ -66,7 +66,7 @@ cosim || status=$?
 says "ray [0-9]* (view test/r_[01], pixel [0-9]*,[0-9]*) sample [0-9]*: " "lockstep with a bad memory"
 end
 begin --version 0x40002
-refuses "tty: the board's accelerator has version 4.2, this program drives 5.x: build both of one source" "another version"
+refuses "tty: the board's accelerator has version 4.2, this program drives 6.x: build both of one source" "another version"
 end
 begin --mute 7
 patience=0.3 refuses "tty: the board does not answer (6 tries, 0.3 s each)" "a board that stops answering"

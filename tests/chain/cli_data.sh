@@ -83,7 +83,7 @@ each_file() { # FUNCTION GOOD
   cp "$2" edited.file; poke edited.file 7 177; $1 edited.file edited.file    # header length beyond any file
   cp "$2" edited.file; poke edited.file 8 170; $1 edited.file edited.file    # not JSON
   cp "$2" edited.file; poke edited.file 40 0; $1 edited.file edited.file     # a NUL in the header
-  sed 's/"version":"1"/"version":"9"/' "$2" >edited.file; $1 edited.file edited.file
+  sed 's/"version":"[12]"/"version":"9"/' "$2" >edited.file; $1 edited.file edited.file
   sed 's/"t_r":"[0-9]"/"t_r":"9"/' "$2" >edited.file; $1 edited.file edited.file
   sed 's/"t_r":"[0-9]"/"t_r":"0"/' "$2" >edited.file; $1 edited.file edited.file
   sed 's/"format":"spikefield/"format":"spokefield/' "$2" >edited.file; $1 edited.file edited.file
