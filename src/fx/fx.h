@@ -8,7 +8,7 @@
  *   C2  spikes  -> 128   AC, spiking
  *   C3  spikes  -> 3     AC, integrating   j(t) drives the colour
  * In input mode radix the currents of D2, C2 and C3 are weighed into one of all T steps, sum of 2^(T-1-t) i(t)
- * (fx_weigh); h is this sum >> (H_SHIFT + T).
+ * (fx_weigh), which stands for 2^T - 1 of them; h is the mean, >> H_SHIFT (fx_weighed_h).
  *
  * A decoder is a net of the last three layers: D1 and D2 have no inputs and no outputs, and all of
  * C1's inputs, up to SF_DIR_MAX, are constant ones that come anew with every sample. It has no density: sigma is 0.
@@ -23,8 +23,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* radix: spikes are binary digits, the most significant first: a train of T steps s(t) has the value sum of
- * s(t) 2^-(t+1), of twice the threshold. A layer waits for all steps of its inputs, and its neurons take their currents
+/* radix: spikes are binary digits, the most significant first: a spike of step t of T is worth
+ * 2^(T-1-t) / (2^T - 1), all of them 1. A layer waits for all steps of its inputs, and its neurons take their currents
  * once. Nothing leaks; tables are read once, behind the last step. */
 typedef enum { FX_HYBRID, FX_DECAY, FX_NODECAY, FX_RADIX } fx_input_mode;
 

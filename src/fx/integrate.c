@@ -35,6 +35,7 @@ int32_t fx_net_theta(const fx_net *net, int layer)
 
 int32_t fx_weighed_h(int32_t sum, int steps)
 {
+  _Static_assert(SF_T_MAX == 8, "2^(15 + T) / (2^T - 1), rounded, for every T");
   static const int32_t mean_of[SF_T_MAX + 1] = {0, 65536, 43691, 37449, 34953, 33825, 33288, 33026, 32897};
   return (int32_t)fx_rshift_round((int64_t)sum * mean_of[steps], 15) >> (SF_H_SHIFT + steps);
 }

@@ -268,7 +268,8 @@ static void colour_inputs(const context *c, const input_format *f, int16_t *x, d
     int16_t *in = x + (size_t)row * (size_t)fx_layer_rows(to);
     for (int i = 0; i < n; i++) in[i] = to_input(nearbyint(constant[i] / lsb[i]), c->input_limit);
     for (int j = 0; j < h; j++) {
-      const int32_t lsbs = (int32_t)nearbyint(one * current[1 + j] / f->h);
+      const double exact = nearbyint(one * current[1 + j] / f->h); /* of a model beyond all reason it fits no integer */
+      const int32_t lsbs = (int32_t)fmax(-FX_MEMBRANE_MAX, fmin(FX_MEMBRANE_MAX, exact));
       in[n + j] = to_input(cal->digits ? fx_weighed_h(lsbs, cal->digits) : lsbs >> SF_H_SHIFT, c->input_limit);
     }
     if (to->bias) in[to->n_in] = (int16_t)to->bias;
