@@ -302,7 +302,15 @@ static inline void expect_nodecay(const hard *h, const hard_seen *seen, int vari
 
 /* ---- radix ---- */
 
-/* Currents of 0 to 8190 in steps of 130 against a threshold of 4096 (D1, C1), with an output of one weight each. */
+/* Weights of the largest h, of either sign. */
+static inline int8_t digits_weight(int neuron, int h)
+{
+  const int w = fixture_rail(FX_D2, 1) - (7 * neuron + 13 * h) % 28;
+  return (int8_t)(h % 2 ? w : -w);
+}
+
+/* Currents of 0 to 8190 in steps of 130 against a threshold of 4096 (D1, C1), with an output of one weight each. C1's
+ * current shows h. */
 static inline void make_digits(hard *h, int variant)
 {
   fx_layer *l = h->scene.net.layer;
@@ -313,7 +321,19 @@ static inline void make_digits(hard *h, int variant)
   h->scene.net.steps = variant + 1;
   for (int o = 0; o < SF_LANES; o++) l[FX_D1].w[o] = (int8_t)(o % 64);
   for (int i = 0; i < SF_LANES; i++) l[FX_D2].w[i * SF_LANES] = (int8_t)(i % 64 == 63 ? 100 : -1);
+  for (int i = 0; i < SF_LANES; i++)
+    for (int j = 0; j < fx_net_h(&h->scene.net); j++) l[FX_D2].w[i * SF_LANES + 1 + j] = digits_weight(i, j);
+  for (int j = 0; j < fx_net_h(&h->scene.net); j++)
+    l[FX_C1].w[(fx_net_constants(&h->scene.net) + j) * SF_LANES + j] = 1;
   h->scene.net.exp_in = (fx_scale){4096, 4, 0};
+}
+
+/* h of a sum of digits: its mean, rounded to 2^-T by a factor of 17 bits, then down by H_SHIFT. */
+static inline int64_t digits_h(int64_t sum, int steps)
+{
+  const double factor = floor(ldexp(1, 15 + steps) / ((1 << steps) - 1) + 0.5);
+  const double mean = floor(ldexp((double)sum * factor, -15) + 0.5);
+  return (int64_t)floor(ldexp(mean, -SF_H_SHIFT - steps));
 }
 
 /* The digits of a current I < 2 theta: 2 theta * sum of 2^(t-s) spike(s) + what is left = 2^(t+1) I. So the membrane
@@ -323,7 +343,7 @@ static inline void expect_digits(const hard *h, const hard_seen *seen, int varia
   const int steps = variant + 1;
   const int64_t theta = h->scene.net.layer[FX_D1].theta;
   if (h->scene.net.mode != FX_RADIX) return;
-  int64_t sum = 0;
+  int64_t sum = 0, of_h[SF_OUT_MAX] = {0};
   for (int o = 0; o < SF_LANES; o++) {
     const int64_t current = 130 * (o % 64);
     int64_t digits = 0;
@@ -333,8 +353,11 @@ static inline void expect_digits(const hard *h, const hard_seen *seen, int varia
       digits += hard_fired(seen, FX_D1, t, o);
     }
     sum += digits * (o % 64 == 63 ? 100 : -1);
+    for (int j = 0; j < fx_net_h(&h->scene.net); j++) of_h[j] += digits * digits_weight(o, j);
     if (current == 0) ck_assert_int_eq(digits, 0);
   }
+  for (int j = 0; j < fx_net_h(&h->scene.net); j++)
+    ck_assert_int_eq(seen->trace->current[FX_C1][0][j], digits_h(of_h[j], steps));
   const fx_scale *s = &h->scene.net.exp_in;
   const double y = sum * ldexp(s->mul, -s->shift) / ((1 << steps) - 1), near = 1 + fabs(y) / 65536;
   ck_assert_uint_ge(seen->out.sigma, fx_exp2((int32_t)floor(y - near)));
