@@ -346,7 +346,7 @@ static inline void naive_prefixes(naive_net *n, int l, int output)
 {
   for (int t = 0; t < n->net->steps; t++) {
     int64_t sum = 0;
-    for (int s = 0; s <= t; s++) sum += (int64_t)n->trace->current[l][s][output] << (t - s);
+    for (int s = 0; s <= t; s++) sum += (int64_t)n->trace->current[l][s][output] * (1 << (t - s));
     n->trace->membrane[l][t][output] = (int32_t)sum;
   }
 }

@@ -174,7 +174,7 @@ TEST(h_of_a_sum)
                     "%d steps, %d: %d for %g", steps, sum, got, exact);
       const int32_t small = 1 << (15 - SF_H_SHIFT - steps), most = small < 100 ? small : 100;
       const int32_t whole = (int32_t)(i % (uint64_t)(2 * most + 1)) - most;
-      ck_assert_int_eq(fx_weighed_h(whole * parts << SF_H_SHIFT, steps), whole);
+      ck_assert_int_eq(fx_weighed_h(whole * parts * (1 << SF_H_SHIFT), steps), whole);
     }
 }
 

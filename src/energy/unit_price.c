@@ -91,11 +91,10 @@ static uint64_t special_fj(const pricing *p, int argument_bits, int result_bits)
          adds(p, 2, result_bits) + 2 * sf_price_access(p->tech, TABLE_ENTRIES * TABLE_ENTRY_BYTES, p->interpolated);
 }
 
-/* Difference from the membrane times the leak, added; compared with the threshold, which a spike takes off. Of
- * radix the leak is a shift, and an update is two additions: it compares and takes off; or it adds a sum to C2's
- * membrane, and the last of those also compares and takes off. T - 1 and T of them are 3 T - 1 additions, which 2 for
- * each of 2 T - 1 updates are not below. The integrators of D2 and C3 neither
- * compare nor reset, and have no threshold. */
+/* Difference from the membrane times the leak, added; compared with the threshold, which a spike takes off. Of radix
+ * the leak is a shift, and an update is two additions: it compares and takes off; or it adds a sum to C2's membrane,
+ * and the last of those also compares and takes off. T - 1 and T of them are 3 T - 1 additions, which 2 for each of 2 T
+ * - 1 updates are not below. The integrators of D2 and C3 neither compare nor reset, and have no threshold. */
 static uint64_t neuron_fj(const pricing *p, const fx_net *net, int l)
 {
   const int bits = fx_layer_state_bits(l, net->mode);
