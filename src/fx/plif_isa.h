@@ -93,7 +93,8 @@ static INLINE void fire(const neurons *n, vec *v, int vectors, const currents *c
   uint64_t bits[SF_SPIKE_WORDS] = {0};
 #pragma GCC unroll 8
   for (int j = 0; j < vectors; j++) {
-    v[j] = charge(n, v[j], current_of(c, i, t, j, neuron), saturated);
+    const bool takes = n->first || n->mode != FX_RADIX; /* there is a current of this step */
+    v[j] = charge(n, v[j], takes ? current_of(c, i, t, j, neuron) : v_set(0), saturated);
     bits[j * WIDTH / 64] |= (uint64_t)v_fire(&v[j], n->theta) << j * WIDTH % 64;
   }
   memcpy((uint8_t *)spikes + neuron / 8, bits, (size_t)(vectors * WIDTH / 8)); /* little-endian */
