@@ -144,6 +144,22 @@ static inline uint32_t *lanes_beside(uint32_t *rows, uint32_t *lanes)
   return PAIR == 1 ? rows : lanes;
 }
 
+/* Where the gradient of rows from m on is worked out; own: room for it. */
+static inline float *gradient_tile(backward_out out, int m, float *own)
+{
+  return PAIR == 1 && out.rows ? floats(out.rows + m * B) : own;
+}
+
+/* The gradient of the currents of n rows from m on, to where it is wanted. */
+static inline void leave_gradient(backward_out out, int m, int n, const float *tile)
+{
+  if (out.sum) add_to(out.sum + m * B, tile, n * B);
+  if (PAIR == 1) return;
+  if (out.all) memcpy(out.all + m * B, tile, (size_t)n * B * sizeof *tile);
+  if (out.rows) row_words(tile, n, out.rows + m / PAIR * B);
+  if (out.lanes) lane_words(tile, n, out.lanes + m * BW);
+}
+
 /* Backward of a spiking layer at step t from the gradient dy (words of rows) of the layer above, through its transposed
  * weights wt[hidden][pairs]; a few rows at a time. */
 static void layer_backward(const sf_net_view *net, int index, float k, int t, const uint32_t *wt, int pairs,
@@ -152,16 +168,11 @@ static void layer_backward(const sf_net_view *net, int index, float k, int t, co
   float own[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
-    float *tile = own;
-    if (PAIR == 1 && out.rows) tile = floats(out.rows + m * B);
+    float *tile = gradient_tile(out, m, own);
     gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
     fire_backward(net, index, k, t, n, h + m * B, out.fired ? out.fired + m * B : NULL, tile, out.carry + m * B,
                   out.leak);
-    if (out.sum) add_to(out.sum + m * B, tile, n * B);
-    if (PAIR == 1) continue;
-    if (out.all) memcpy(out.all + m * B, tile, (size_t)n * B * sizeof *tile);
-    if (out.rows) row_words(tile, n, out.rows + m / PAIR * B);
-    if (out.lanes) lane_words(tile, n, out.lanes + m * BW);
+    leave_gradient(out, m, n, tile);
   }
 }
 

@@ -203,7 +203,7 @@ static void decoder_backward(const sf_decoder_words *n, sf_decoder_block *d, int
     radix_output_backward(net, &d->net, p, fired, dcolour, gj, w->sum1, &grad->net, w);
     add_to(gsum, gj, 4 * B);
     waiting_backward(v, 1, p + 1, net->w4t, hidden / PAIR, words(w->rows), d->net.m3[p], fired,
-                     (waiting_out){w->sum3, NULL, NULL});
+                     (backward_out){.sum = w->sum3, .rows = NULL, .lanes = NULL});
   }
   for (int t = steps - 1; t >= 0 && !is_radix(v); t--) {
     float gj[4 * B];

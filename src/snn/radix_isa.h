@@ -202,28 +202,18 @@ static const word *worth_lanes(const sf_net_view *net, int layer, int steps, con
   return operands(w->t);
 }
 
-/* What a layer's backward pass leaves: the current's gradient, as words; rows or lanes NULL: not wanted. */
-typedef struct waiting_out {
-  float *sum; /* it is added here, or NULL */
-  uint32_t *rows, *lanes;
-} waiting_out;
-
 /* Backward of a layer from the gradient dy (words of rows) of the layer above through its transposed weights
- * wt[hidden][pairs]. */
+ * wt[hidden][pairs]. Of `out`, sum, rows and lanes count. */
 static void waiting_backward(const sf_net_view *net, int index, int steps, const uint32_t *wt, int pairs,
-                             const word *dy, const float *current, const float *fired, waiting_out out)
+                             const word *dy, const float *current, const float *fired, backward_out out)
 {
   float own[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
-    float *tile = own;
-    if (PAIR == 1 && out.rows) tile = floats(out.rows + m * B);
+    float *tile = gradient_tile(out, m, own);
     gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
     digits_backward(net, index, steps, n, current + m * B, fired, tile);
-    if (out.sum) add_to(out.sum + m * B, tile, n * B);
-    if (PAIR == 1) continue;
-    if (out.rows) row_words(tile, n, out.rows + m / PAIR * B);
-    if (out.lanes) lane_words(tile, n, out.lanes + m * BW);
+    leave_gradient(out, m, n, tile);
   }
 }
 
@@ -242,7 +232,7 @@ static void radix_output_backward(const sf_net_words *n, const sf_block *x, int 
   }
   add_outer(grad->w5, hidden, lane_words(gj, 4, small), 4, worth_lanes(net, 2, p + 1, x->m4[p], w), hidden);
   waiting_backward(net, 2, p + 1, n->w5t, 4 / PAIR, row_words(gj, 4, small), x->m4[p], fired,
-                   (waiting_out){sum, w->rows, lanes});
+                   (backward_out){.sum = sum, .rows = w->rows, .lanes = lanes});
   add_outer(grad->w4, hidden, operands(lanes), hidden, worth_lanes(net, 1, p + 1, x->m3[p], w), hidden);
 }
 
@@ -268,7 +258,7 @@ static void radix_backward(const sf_net_words *n, const sf_block *x, int steps, 
     const float *fired = charged_lanes(net, x, p + 1 == steps, room);
     radix_output_backward(n, x, p, fired, dcolour, gj, NULL, grad, w);
     waiting_backward(net, 1, p + 1, n->w4t, hidden / PAIR, operands(w->rows), x->m3[p], fired,
-                     (waiting_out){w->sum3, rows, lanes});
+                     (backward_out){.sum = w->sum3, .rows = rows, .lanes = lanes});
     gemm(operands(n->w3ht), hidden / PAIR, SF_DENSITY_OUT, hidden / PAIR, operands(rows), B, B, NULL, 0, gi, B);
     transpose(lane_words(x->i[p], SF_DENSITY_OUT, w->rows), SF_DENSITY_OUT, BW, words(w->t), SF_DENSITY_OUT);
     /* Column 16 of the padded gradient meets i[0], which is no input of C1: scratch. h starts at column 17. */
@@ -277,7 +267,7 @@ static void radix_backward(const sf_net_words *n, const sf_block *x, int steps, 
     add_outer(grad->w2, hidden, lane_words(gi, SF_DENSITY_OUT, small), SF_DENSITY_OUT,
               worth_lanes(net, 0, p + 1, x->m1[0], w), hidden);
     waiting_backward(net, 0, p + 1, n->w2t, SF_DENSITY_OUT / PAIR, row_words(gi, SF_DENSITY_OUT, small), x->m1[0],
-                     fired, (waiting_out){w->sum1, NULL, NULL});
+                     fired, (backward_out){.sum = w->sum1, .rows = NULL, .lanes = NULL});
   }
   constant_backward(n, x, df, grad, w);
   tiles_end();
