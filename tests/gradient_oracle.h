@@ -71,14 +71,12 @@ static inline dual leak(const oracle *o, int layer)
 
 /* ---- the nets ---- */
 
-/* Of a membrane, or an integrator. In radix mode it takes its current once, and doubles what is left. */
+/* Of a membrane, or an integrator. */
 static inline dual charged_by(const oracle *o, int step, dual k, dual before, dual in)
 {
   const sf_config *c = &o->t->model.config;
   if (c->net == SF_NET_ANN) return in;
   switch (c->mode) {
-  case SF_RADIX:
-    return step ? 2 * before : in;
   case SF_NODECAY:
     return (1 - k) * before + in;
   case SF_HYBRID:
@@ -154,17 +152,31 @@ static inline dual rounded_h(const oracle *o, int digits, dual h)
   return with_slope(step * floor(creal(h) / step + 0.5 / (1 << (SF_H_SHIFT + digits))), 1, h);
 }
 
+/* Radix mode: what the digits of a current are worth, with the slope of the smoothed ramp. */
+static inline dual worth_of(double theta, int steps, dual current)
+{
+  const double alpha = (double)sf_ramp_alpha((float)theta), levels = pow(2, steps), i = creal(current);
+  const double number = fmin(fmax(floor(i * levels / (2 * theta)), 0), levels - 1);
+  const double slope = (creal(logistic(alpha * i)) - creal(logistic(alpha * (i - 2 * theta)))) / (2 * theta);
+  return with_slope(number / (levels - 1), slope, current);
+}
+
 /* Radix mode: out[rows] = what matrix `id` makes of all spikes of a layer, and of a bias, SF_P_COUNT for none. */
 static inline void oracle_wait(const oracle *o, int spiking, int steps, const dual *current, oracle_layer *l, int id,
                                int bias, dual *out)
 {
-  dual s[SF_LANES], worth[SF_LANES] = {0};
-  for (int t = 0; t < steps; t++) {
-    oracle_fire(o, spiking, t, 0, current, l, s);
-    for (int n = 0; n < o->t->model.config.hidden; n++) worth[n] += s[n] * pow(2, steps - 1 - t) / (pow(2, steps) - 1);
+  const double theta = (double)o->t->model.config.theta[spiking];
+  const int hidden = o->t->model.config.hidden;
+  dual worth[SF_LANES];
+  for (int n = 0; n < hidden; n++) {
+    worth[n] = worth_of(theta, steps, current[n]);
+    l->silent[n] = 1 - spike(current[n] - 2 * theta / pow(2, steps));
+    const double unit = 2 * theta / pow(2, steps), at = creal(current[n]) / unit;
+    const double next = fmin(fmax(round(at), 1), pow(2, steps) - 1); /* where another number begins */
+    if (o->nearest) *o->nearest = fmin(*o->nearest, fabs(at - next) * unit);
   }
   if (bias < SF_P_COUNT) oracle_bias(o, bias, out);
-  oracle_multiply(o, id, 0, o->t->model.config.hidden, worth, out);
+  oracle_multiply(o, id, 0, hidden, worth, out);
 }
 
 /* Radix mode: C1 to the colour of a prefix. */

@@ -121,6 +121,27 @@ static int used_empty_lanes(const sf_batch *b, int features)
   return used;
 }
 
+/* Features of samples that are not those of their place, bit for bit. */
+static int wrong_features(const sf_trainer *t)
+{
+  const sf_batch *b = &t->batch;
+  const int levels = t->model.config.levels;
+  const float *table = sf_model_param(&t->model, SF_P_GRID);
+  int wrong = 0;
+  for (int r = 0; r < b->rays; r++)
+    for (int s = 0; s < b->ray[r].count; s++) {
+      const int lane = b->ray[r].lane + s;
+      for (int level = 0; level < levels; level++) {
+        float out[2 * SF_BLOCK];
+        t->kernels->grid_forward(&t->model.level[level], table, b->x + (size_t)(lane / SF_BLOCK) * 3 * SF_BLOCK, out);
+        const float *f = b->f + ((size_t)(lane / SF_BLOCK) * levels + level) * 2 * SF_BLOCK;
+        wrong += f[lane % SF_BLOCK] != out[lane % SF_BLOCK];
+        wrong += f[SF_BLOCK + lane % SF_BLOCK] != out[SF_BLOCK + lane % SF_BLOCK];
+      }
+    }
+  return wrong;
+}
+
 /* After some iterations on the simple scene: what compaction keeps is what composites to a transmittance above 1e-4 in
  * front of it in a composited prefix, sample by sample with the oracle, and nothing else of the batch changes. Of nets
  * that take steps at every sample, and of nets along rays. */
@@ -157,6 +178,7 @@ LOOP_TEST(compaction_keeps_what_light_reaches, 2)
   sf_gradient_run(t, plan, &mean, firing);
   check_layout(b);
   ck_assert_int_eq(used_empty_lanes(b, 2 * t->model.config.levels), 0);
+  ck_assert_int_eq(wrong_features(t), 0);
   int differ = 0, samples = 0;
   for (int r = 0; r < rays; r++) {
     differ += b->ray[r].count != expected[r];

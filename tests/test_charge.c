@@ -148,12 +148,12 @@ TEST(price_by_hand)
   for (int l = 0; l < 3; l++) ck_assert_float_eq(t->net->view.charge[l], 0);
 }
 
-/* Neurons of the scalar nets that fire at any step. A current within rounding of the threshold may fire in one and not
- * in the other. */
-TEST(fired_neurons_are_those_of_the_oracle)
+/* Spikes of the scalar nets, and neurons that fire at any step. A current within rounding of the threshold may fire in
+ * one and not in the other. */
+LOOP_TEST(spikes_are_those_of_the_oracle, 2)
 {
   static sf_net_trace trace;
-  OWNED(rig) r = rig_make(false, SF_HYBRID);
+  OWNED(rig) r = rig_make(false, _i ? SF_RADIX : SF_HYBRID);
   sf_group g = {0};
   OWNED(sf_model) m = r.model;
   r.model = (sf_model){0};
@@ -163,7 +163,7 @@ TEST(fired_neurons_are_those_of_the_oracle)
   k->prepare(&view, &r.words->net);
   k->forward(&r.words->net, &r.block->net, STEPS, STEPS, r.scratch);
   sf_count_spikes(&t, 0, STEPS, &r.block->net, LANES, &g);
-  double fired[3] = {0};
+  double fired[3] = {0}, all[3] = {0};
   for (int lane = 0; lane < LANES; lane++) {
     float f[FEATURES], sh[SF_DIR_FEATURES], sigma[STEPS], colour[3 * STEPS];
     for (int i = 0; i < FEATURES; i++) f[i] = r.block->net.f[i * SF_BLOCK + lane];
@@ -173,11 +173,12 @@ TEST(fired_neurons_are_those_of_the_oracle)
       for (int n = 0; n < H; n++) {
         int spikes = 0;
         for (int step = 0; step < STEPS; step++) spikes += trace.spike[(const int[]){0, 2, 3}[l]][step][n];
-        fired[l] += spikes > 0;
+        fired[l] += spikes > 0, all[l] += spikes;
       }
   }
   for (int l = 0; l < 3; l++) {
     ck_assert_double_eq_tol(g.fired[l], fired[l], 2);
+    ck_assert_double_eq_tol(g.spikes[l], all[l], 4);
     ck_assert(fired[l] > 50 && fired[l] < LANES * H - 50);
   }
   ck_assert_double_eq(g.lanes, LANES);

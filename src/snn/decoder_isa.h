@@ -199,10 +199,10 @@ static void decoder_backward(const sf_decoder_words *n, sf_decoder_block *d, int
   if (charged(v) && !is_radix(v)) count_fired(v, &d->net, 1, steps, w);
   for (int p = d->net.from; p < steps && is_radix(v); p++) {
     float gj[4 * B], room[B];
-    const float *fired = charged_lanes(v, &d->net, p + 1 == steps, room);
-    radix_output_backward(net, &d->net, p, fired, dcolour, gj, w->sum1, &grad->net, w);
+    const float *charge = charged_lanes(v, &d->net, p + 1 == steps, room);
+    radix_output_backward(net, &d->net, p, charge, dcolour, gj, w->sum1, &grad->net, w);
     add_to(gsum, gj, 4 * B);
-    waiting_backward(v, 1, p + 1, net->w4t, hidden / PAIR, words(w->rows), d->net.m3[p], fired,
+    waiting_backward(v, 1, p + 1, net->w4t, hidden / PAIR, words(w->rows), d->net.m3[p], charge,
                      (backward_out){.sum = w->sum3, .rows = NULL, .lanes = NULL});
   }
   for (int t = steps - 1; t >= 0 && !is_radix(v); t--) {

@@ -23,6 +23,14 @@ static inline float sf_digit(int t, int steps)
   return (float)(1 << (steps - 1 - t)) / (float)((1 << steps) - 1);
 }
 
+/* Radix mode: alpha of the sigmoids that smooth the ends of the ramp. It falls above a threshold of 5/3, where the ends
+ * are far apart, so that exp(-2 alpha theta) is a number. */
+static inline float sf_ramp_alpha(float theta)
+{
+  const float most = 20.0f / theta;
+  return most < 12 ? most : 12;
+}
+
 /* h as the accelerator sees it: current >> SF_H_SHIFT, in radix mode with a current rounded to 2^-digits, in the other
  * modes (digits 0) with an integer one. The half of that is for its rounding, which must not decide there. */
 static inline float sf_round_h(float h, float step, int digits)

@@ -54,57 +54,30 @@ static inline void digits(float theta, int steps, int rows, const float *restric
   }
 }
 
-/* Backward of a layer's rows: g, gradient of what the spikes are worth in, of the current out. Follows fire_backward.
- * fired[B]: NULL, or firing is charged: 0, and 2 where no sample is. */
-static inline __attribute__((always_inline)) void digits_backward_of(const sf_net_view *net, int layer, const int steps,
-                                                                     int rows, const float *restrict current,
-                                                                     const float *fired, float *restrict g)
+/* Backward of a layer's rows: g, gradient of what the spikes are worth in, of the current i out. The staircase of the
+ * digits has the slope of a ramp from 0 to 2 theta whose ends are smoothed by a sigmoid s. With e = exp(alpha (i - 2
+ * theta)) and q = exp(-2 alpha theta) that is
+ *
+ *   (s(alpha i) - s(alpha (i - 2 theta))) / 2 theta = (1 - q) / 2 theta * e / ((e + 1) (e + q))
+ *
+ * charge: NULL, or firing is charged: 1 where a sample is, else 0. A neuron that fires costs net->charge. The step from
+ * no spike to one, at the last digit, has the surrogate's slope. */
+static void digits_backward(const sf_net_view *net, int layer, int steps, int rows, const float *restrict current,
+                            const float *charge, float *restrict g)
 {
-  const vf theta = (vf){0} + net->theta[layer], one = (vf){0} + 1.0f, charge = (vf){0} + net->charge[layer];
+  float e[LAYER_ROWS * B];
+  const float theta = net->theta[layer], alpha = sf_ramp_alpha(theta), q = fast_exp(-2 * alpha * theta);
+  const float top = (1 - q) / (2 * theta), first = 2 * theta / (float)(1 << steps);
+  for (int i = 0; i < rows * B; i++) {
+    const float x = alpha * (current[i] - 2 * theta);
+    e[i] = fast_exp(x < 40.0f ? x : 40.0f); /* its square is a number */
+  }
   for (int i = 0; i < rows * B; i += VL) {
-    vf h[SF_T_MAX], v = load(current + i), count = {0};
-#pragma GCC unroll 8
-    for (int t = 0; t < steps; t++) {
-      h[t] = v;
-      if (fired) count += (vf)((v >= theta) & (vi)one);
-      v = 2.0f * (v - (vf)((v >= theta) & (vi)theta));
-    }
-    if (fired) count += load(fired + i % B);
-    const vf last = last_digit(steps) * load(g + i); /* the other steps' gradients are exact multiples */
-    vf carry = {0}, gh = {0};
-#pragma GCC unroll 8
-    for (int t = steps - 1; t >= 0; t--) {
-      vf gs = (float)(1 << (steps - 1 - t)) * last;
-      if (fired) gs += (vf)((count == (vf)((h[t] >= theta) & (vi)one)) & (vi)charge);
-      gh = (gs - theta * carry) * surrogate(h[t] - theta) + carry;
-      carry = 2.0f * gh;
-    }
-    store(g + i, gh);
+    const vf x = load(e + i);
+    vf out = top * load(g + i) * (x * reciprocal((x + 1.0f) * (x + q)));
+    if (charge) out += net->charge[layer] * load(charge + i % B) * surrogate(load(current + i) - first);
+    store(g + i, out);
   }
-}
-
-/* The same with a constant number of steps, which stay in registers. */
-static void digits_backward(const sf_net_view *net, int layer, int steps, int rows, const float *current,
-                            const float *fired, float *g)
-{
-#define OF(n)                                                                                                          \
-  case n:                                                                                                              \
-    if (fired)                                                                                                         \
-      digits_backward_of(net, layer, n, rows, current, fired, g);                                                      \
-    else                                                                                                               \
-      digits_backward_of(net, layer, n, rows, current, NULL, g);                                                       \
-    break
-  switch (steps) {
-    OF(1);
-    OF(2);
-    OF(3);
-    OF(4);
-    OF(5);
-    OF(6);
-    OF(7);
-    OF(8);
-  }
-#undef OF
 }
 
 /* out[rows][B] = init + last_digit times products with numbers, which stand in out. init NULL: 0. */
@@ -205,21 +178,21 @@ static const word *worth_lanes(const sf_net_view *net, int layer, int steps, con
 /* Backward of a layer from the gradient dy (words of rows) of the layer above through its transposed weights
  * wt[hidden][pairs]. Of `out`, sum, rows and lanes count. */
 static void waiting_backward(const sf_net_view *net, int index, int steps, const uint32_t *wt, int pairs,
-                             const word *dy, const float *current, const float *fired, backward_out out)
+                             const word *dy, const float *current, const float *charge, backward_out out)
 {
   float own[LAYER_ROWS * B];
   for (int m = 0, n; m < net->hidden; m += n) {
     n = layer_rows(net->hidden - m);
     float *tile = gradient_tile(out, m, own);
     gemm(operands(wt) + m * pairs, pairs, n, pairs, dy, B, B, NULL, 0, tile, B);
-    digits_backward(net, index, steps, n, current + m * B, fired, tile);
+    digits_backward(net, index, steps, n, current + m * B, charge, tile);
     leave_gradient(out, m, n, tile);
   }
 }
 
 /* C3 and C2 of prefix p + 1. Leaves the gradient of C2's current as words of rows in w->rows; gj[4][B], the fourth row
  * zero. sum: that gradient is added here, or NULL. */
-static void radix_output_backward(const sf_net_words *n, const sf_block *x, int p, const float *fired,
+static void radix_output_backward(const sf_net_words *n, const sf_block *x, int p, const float *charge,
                                   const float *dcolour, float *gj, float *sum, sf_net_grad *grad, sf_net_scratch *w)
 {
   const sf_net_view *net = &n->view;
@@ -231,15 +204,15 @@ static void radix_output_backward(const sf_net_words *n, const sf_block *x, int 
     gj[l] = dcolour[p * 3 * B + l] * c * (1.0f - c);
   }
   add_outer(grad->w5, hidden, lane_words(gj, 4, small), 4, worth_lanes(net, 2, p + 1, x->m4[p], w), hidden);
-  waiting_backward(net, 2, p + 1, n->w5t, 4 / PAIR, row_words(gj, 4, small), x->m4[p], fired,
+  waiting_backward(net, 2, p + 1, n->w5t, 4 / PAIR, row_words(gj, 4, small), x->m4[p], charge,
                    (backward_out){.sum = sum, .rows = w->rows, .lanes = lanes});
   add_outer(grad->w4, hidden, operands(lanes), hidden, worth_lanes(net, 1, p + 1, x->m3[p], w), hidden);
 }
 
-/* fired of digits_backward for prefix p + 1 of `steps`: the last one is charged. */
+/* charge of digits_backward: the last prefix is charged. */
 static const float *charged_lanes(const sf_net_view *net, const sf_block *x, bool last, float *room)
 {
-  for (int l = 0; l < B; l++) room[l] = l < x->lanes ? 0.0f : 2.0f;
+  for (int l = 0; l < B; l++) room[l] = l < x->lanes;
   return last && charged(net) ? room : NULL;
 }
 
@@ -252,12 +225,14 @@ static void radix_backward(const sf_net_words *n, const sf_block *x, int steps, 
   tiles_begin();
   memset(w->sum1, 0, plane);
   memset(w->sum3, 0, plane);
+  float gsum[SF_DENSITY_OUT * B] = {0}, room[B];
+  uint32_t small[SF_DENSITY_OUT * B];
   for (int p = x->from; p < steps; p++) {
-    float gj[4 * B], gi[SF_DENSITY_OUT * B], room[B];
-    uint32_t small[SF_DENSITY_OUT * B], *rows = w->spikes, *lanes = lanes_beside(rows, w->lanes);
-    const float *fired = charged_lanes(net, x, p + 1 == steps, room);
-    radix_output_backward(n, x, p, fired, dcolour, gj, NULL, grad, w);
-    waiting_backward(net, 1, p + 1, n->w4t, hidden / PAIR, operands(w->rows), x->m3[p], fired,
+    float gj[4 * B], gi[SF_DENSITY_OUT * B];
+    uint32_t *rows = w->spikes, *lanes = lanes_beside(rows, w->lanes);
+    const float *charge = charged_lanes(net, x, p + 1 == steps, room);
+    radix_output_backward(n, x, p, charge, dcolour, gj, NULL, grad, w);
+    waiting_backward(net, 1, p + 1, n->w4t, hidden / PAIR, operands(w->rows), x->m3[p], charge,
                      (backward_out){.sum = w->sum3, .rows = rows, .lanes = lanes});
     gemm(operands(n->w3ht), hidden / PAIR, SF_DENSITY_OUT, hidden / PAIR, operands(rows), B, B, NULL, 0, gi, B);
     transpose(lane_words(x->i[p], SF_DENSITY_OUT, w->rows), SF_DENSITY_OUT, BW, words(w->t), SF_DENSITY_OUT);
@@ -266,9 +241,11 @@ static void radix_backward(const sf_net_words *n, const sf_block *x, int steps, 
     for (int l = 0; l < B; l++) gi[l] = dsigma[p * B + l] * exp_slope(x->i[p][l]);
     add_outer(grad->w2, hidden, lane_words(gi, SF_DENSITY_OUT, small), SF_DENSITY_OUT,
               worth_lanes(net, 0, p + 1, x->m1[0], w), hidden);
-    waiting_backward(net, 0, p + 1, n->w2t, SF_DENSITY_OUT / PAIR, row_words(gi, SF_DENSITY_OUT, small), x->m1[0],
-                     fired, (backward_out){.sum = w->sum1, .rows = NULL, .lanes = NULL});
+    add_to(gsum, gi, SF_DENSITY_OUT * B);
   }
+  /* All prefixes have the current of D1, and the ramp's slope does not hang on their steps. */
+  waiting_backward(net, 0, steps, n->w2t, SF_DENSITY_OUT / PAIR, row_words(gsum, SF_DENSITY_OUT, small), x->m1[0],
+                   charged_lanes(net, x, true, room), (backward_out){.sum = w->sum1, .rows = NULL, .lanes = NULL});
   constant_backward(n, x, df, grad, w);
   tiles_end();
 }

@@ -37,12 +37,18 @@ static int plan_round(sf_trainer *t, int first, int end, int block[GROUPS + 1])
   return block[end];
 }
 
+/* Where a lane's column begins in an array [block][rows][SF_BLOCK]. */
+static size_t column(int lane, int rows)
+{
+  return (size_t)(lane / SF_BLOCK) * rows * SF_BLOCK + lane % SF_BLOCK;
+}
+
 /* to[block][rows][SF_BLOCK] at lane `at`.. = from at lane `start`.. */
 static void move(const float *from, int start, float *to, int at, int count, int rows)
 {
   for (int s = 0; s < count; s++) {
-    const float *x = from + (size_t)((start + s) / SF_BLOCK) * rows * SF_BLOCK + (start + s) % SF_BLOCK;
-    float *y = to + (size_t)((at + s) / SF_BLOCK) * rows * SF_BLOCK + (at + s) % SF_BLOCK;
+    const float *x = from + column(start + s, rows);
+    float *y = to + column(at + s, rows);
     for (int i = 0; i < rows; i++) y[i * SF_BLOCK] = x[i * SF_BLOCK];
   }
 }
@@ -51,7 +57,7 @@ static void move(const float *from, int start, float *to, int at, int count, int
 static void clear_tail(int lane, int end, float *to, int rows)
 {
   for (; lane < end; lane++)
-    for (int i = 0; i < rows; i++) to[((size_t)(lane / SF_BLOCK) * rows + i) * SF_BLOCK + lane % SF_BLOCK] = 0;
+    for (int i = 0; i < rows; i++) to[column(lane, rows) + (size_t)i * SF_BLOCK] = 0;
 }
 
 /* The lanes of a block where rays begin. */
@@ -104,6 +110,26 @@ static bool is_lit(const sf_loss_plan *p, const float depth[SF_T_MAX])
   return lit;
 }
 
+/* The features of a round's lit samples are kept until it is known where the samples go. They wait in batch->df, which
+ * nobody needs before the backward pass, one row for each sample that was marched. */
+static void keep_features(sf_batch *b, const sf_ray *ray, int first, int features)
+{
+  for (int s = first; s < ray->count; s++) {
+    const float *f = b->f + column(ray->lane + s - first, features);
+    float *row = b->df + (size_t)(ray->from + s) * features;
+    for (int i = 0; i < features; i++) row[i] = f[i * SF_BLOCK];
+  }
+}
+
+static void put_features(sf_batch *b, const sf_ray *ray, int features)
+{
+  for (int s = 0; s < ray->count; s++) {
+    const float *row = b->df + (size_t)(ray->from + s) * features;
+    float *f = b->f + column(ray->lane + s, features);
+    for (int i = 0; i < features; i++) f[i * SF_BLOCK] = row[i];
+  }
+}
+
 /* Counts the samples that light reaches in a prefix that is composited. depth: the logarithm of its light. */
 static void follow(const sf_loss_plan *p, const sf_batch *b, sf_ray *ray, float depth[SF_T_MAX])
 {
@@ -123,7 +149,11 @@ static void look(sf_trainer *t, const sf_loss_plan *p, int part, const int block
   int lanes = 0;
   for (int r = part_start(b, part); r < part_start(b, part + 1); r++) lanes += b->ray[r].looked;
   find_densities(t, p, part, block, lanes, w);
-  for (int r = part_start(b, part); r < part_start(b, part + 1); r++) follow(p, b, &b->ray[r], b->depth[r]);
+  for (int r = part_start(b, part); r < part_start(b, part + 1); r++) {
+    const int seen = b->ray[r].count;
+    follow(p, b, &b->ray[r], b->depth[r]);
+    keep_features(b, &b->ray[r], seen, 2 * t->model.config.levels);
+  }
 }
 
 static void exchange(float **a, float **b)
@@ -193,7 +223,11 @@ sf_status sf_batch_compact(sf_trainer *t, const sf_loss_plan *plan)
   clear_tails(b, b->spare_x, 3);
   exchange(&b->x, &b->spare_x);
   exchange(&b->delta, &b->spare_delta);
-  encode(t, b->x, b->blocks);
+  if (sf_ranks_size(t->options.ranks) == 1) {
+#pragma omp parallel for schedule(static) num_threads(t->workers)
+    for (int r = 0; r < b->rays; r++) put_features(b, &b->ray[r], features);
+  } else
+    encode(t, b->x, b->blocks); /* others looked at some of these samples */
   /* Not what the corner of the box has: spikes of these lanes count, too, when the kernels choose between events and
    * dense products. */
   clear_tails(b, b->f, features);

@@ -91,18 +91,21 @@ static void count_along(const sf_config *c, int first, const sf_block *b, int la
 static void count_digits(const float *current, int rows, int lanes, int steps, float theta, double *spikes,
                          double *fired)
 {
-  for (int r = 0; r < rows; r++)
-    for (int l = 0; l < lanes; l++) {
-      float v = current[r * SF_BLOCK + l];
-      int count = 0;
-      for (int s = 0; s < steps; s++) {
-        const bool spike = v >= theta;
-        count += spike;
-        v = sf_plif_charge(SF_RADIX, s + 1, 0, v - (spike ? theta : 0), 0);
+  long all = 0, any = 0;
+  for (int r = 0; r < rows; r++) {
+    float v[SF_BLOCK];
+    int count[SF_BLOCK] = {0};
+    memcpy(v, current + r * SF_BLOCK, sizeof v);
+    for (int s = 0; s < steps; s++)
+      for (int l = 0; l < SF_BLOCK; l++) { /* without branches, so that compilers make vectors of it */
+        const int spike = v[l] >= theta;
+        count[l] += spike;
+        v[l] = sf_plif_charge(SF_RADIX, s + 1, 0, v[l] - (float)spike * theta, 0);
       }
-      *spikes += count;
-      *fired += count > 0;
-    }
+    for (int l = 0; l < lanes; l++) all += count[l], any += count[l] > 0;
+  }
+  *spikes += (double)all;
+  *fired += (double)any;
 }
 
 static void count_radix(const sf_config *c, int first, int steps, const sf_block *b, int lanes, sf_group *g)
