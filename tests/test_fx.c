@@ -178,6 +178,15 @@ TEST(h_of_a_sum)
     }
 }
 
+/* The factor is the nearest one: sums far beyond those of a net show its last bit. */
+TEST(h_has_the_nearest_factor)
+{
+  for (int steps = 1; steps <= SF_T_MAX; steps++) {
+    const int64_t factor = llround(ldexp(1, 15 + steps) / ((1 << steps) - 1)), sum = 1 << 29;
+    ck_assert_int_eq(fx_weighed_h((int32_t)sum, steps), (sum * factor + (1 << 14)) >> 15 >> (SF_H_SHIFT + steps));
+  }
+}
+
 /* The spikes of a current are the first T binary digits of I / (2 theta), cut; rails do not change them. */
 TEST(radix_fires_the_digits_of_its_current)
 {

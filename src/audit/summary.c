@@ -53,10 +53,10 @@ static void print_words(FILE *out, const fx_net *net)
       out,
       "A picture is made of rays, a ray of samples; each sample goes through a small spiking net for t_r time steps:\n"
       "%scolour (C1 C2 C3). A MAC multiplies a real-valued input by a weight and adds; a SOP adds a weight because a\n"
-      "neuron fired; a neuron update is one leak, comparison and reset. The ReLU twin is a\n"
+      "neuron fired; a neuron update is one %s, comparison and reset. The ReLU twin is a\n"
       "count: a dense ReLU net of the same layer sizes on the same samples, every synapse a MAC, no zeros skipped; it\n"
       "was not trained for this figure.\n\n",
-      fx_net_first_layer(net) == FX_D1 ? "density (D1 D2), " : "");
+      fx_net_first_layer(net) == FX_D1 ? "density (D1 D2), " : "", net->mode == FX_RADIX ? "doubling" : "leak");
 }
 
 static const char *less(double saving)
