@@ -143,8 +143,7 @@ typedef struct sf_search {
   double slope2, slope_level, level2;
   double firing[3], samples_per_frame, rays_per_sample; /* fast */
   double at;                                            /* share of the search at the last measurement */
-  double mark, mark_at,
-      moved; /* t* where it was compared last, where in the search that was, and how far it had moved */
+  double mark, mark_at, moved; /* t* of a quarter of the search ago, where that was, and how far it moved in one */
 } sf_search;
 
 /* Of --charge (charge.c): averages over its recent iterations. */

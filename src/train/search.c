@@ -18,13 +18,13 @@ const char *const sf_search_names[] = {"none",          "running",     "balanced
 
 /* In units of the search's share of stage II: the memory of the error's average and of the share's, and how far back t*
  * is compared to see whether it rests. */
-static const double memory = 0.08, share_memory = 0.25, look_back = 0.1;
+static const double memory = 0.08, share_memory = 0.25, quarter = 0.25;
 /* Full iterations before t* moves: one alone may have any slope. */
 enum { FIRST_MOVE = 4 };
-/* t* rests when it moved less than this since the look back, and its standard error is below twice that. */
-static const double still = 0.05;
-/* At the end of the search t* counts as reached when it moved up to this since the look back. */
-static const double close_enough = 0.2;
+/* t* rests when it moved less than this in a quarter of the search, and its standard error is below it. */
+static const double still = 0.1;
+/* At the end of the search t* counts as reached up to this. */
+static const double close_enough = 0.3;
 
 /* Least-squares slope of the error over 1..n steps, downwards: what one more step saves. */
 static double slope(const double *error, int n)
@@ -273,19 +273,19 @@ static void average(sf_trainer *t, const sf_loss_sums *mean, double ratio, doubl
   s->measured++;
 }
 
-/* Does t* rest? */
+/* Does t* rest? Looks back every quarter of the search. */
 static bool rests(sf_trainer *t)
 {
   sf_search *s = &t->search;
   const double now = t->model.t_star;
   if (s->measured == FIRST_MOVE) s->mark = now, s->mark_at = s->at;
-  if (s->at < s->mark_at + look_back) return false;
+  if (s->at < s->mark_at + quarter) return false;
   const double moved = fabs(now - s->mark), error = worth_error(s);
   const bool same = lround(now) == lround(s->mark);
   s->mark = now;
   s->mark_at = s->at;
   s->moved = moved;
-  return moved < still && error < 2 * still && same;
+  return moved < still && error < still && same;
 }
 
 static void move(sf_trainer *t)
@@ -317,8 +317,8 @@ void sf_search_end(sf_trainer *t)
   sf_search *s = &t->search;
   if (s->state != SF_SEARCH_RUNNING) return;
   if (s->measured) move(t);
-  /* In a whole look back: in the one before where t* was marked just now. */
-  const double part = (s->at - s->mark_at) / look_back, since = fabs(t->model.t_star - s->mark);
+  /* In a quarter of the search: in the one before where t* was marked just now. */
+  const double part = (s->at - s->mark_at) / quarter, since = fabs(t->model.t_star - s->mark);
   const double moved = part < 0.5 ? fmax(since, s->moved) : since / part;
   if (!s->measured)
     s->state = SF_SEARCH_TOO_SHORT;
