@@ -109,6 +109,25 @@ static inline dual oracle_losses(const oracle *o, const sf_ray *pixel, const ora
 
 /* ---- the batch as it was drawn ---- */
 
+/* A sample near a camera learns slower: x is its position. Where its loss stands is unchanged. */
+static inline void oracle_slow(const oracle *o, const sf_ray *from, const double x[3], oracle_ray *ray, int s)
+{
+  const sf_steps *box = &o->t->intervals;
+  double away = 0;
+  for (int a = 0; a < 3; a++) {
+    const double at = (double)box->low[a] + x[a] * ((double)box->high[a] - (double)box->low[a]);
+    away += pow(at - (double)from->origin[a], 2);
+  }
+  const double weight = pow(sqrt(away) / (double)o->t->near_camera, 2);
+  if (!(weight < 1)) return;
+  if (o->slowed) ++*o->slowed;
+  for (int t = 0; t < o->plan->steps; t++) {
+    ray->sigma[t][s] = with_slope(creal(ray->sigma[t][s]), weight, ray->sigma[t][s]);
+    for (int c = 0; c < 3; c++)
+      ray->colour[t][s][c] = with_slope(creal(ray->colour[t][s][c]), weight, ray->colour[t][s][c]);
+  }
+}
+
 /* Density and colour of the samples of ray r; what their firing is charged with. */
 static inline dual oracle_grid_ray(const oracle *o, int r, oracle_ray *ray)
 {
@@ -130,6 +149,7 @@ static inline dual oracle_grid_ray(const oracle *o, int r, oracle_ray *ray)
       oracle_nets_along(o, feature, sh, s, layer, ray, s);
     else
       sum += oracle_nets(o, feature, sh, ray, s);
+    oracle_slow(o, from, x, ray, s);
   }
   return sum;
 }
@@ -151,12 +171,14 @@ static inline dual oracle_planes_ray(const oracle *o, int r, oracle_ray *ray)
       ray->sigma[t][s] = sigma;
       memset(ray->colour[t][s], 0, sizeof ray->colour[t][s]);
     }
-    if (!(o->t->batch.hit[r][s / 64] >> s % 64 & 1)) continue;
-    oracle_inputs(o, x, o->t->batch.ray[r].direction, in);
-    if (o->t->model.config.along)
-      oracle_decoder_along(o, in, decoded++, layer, ray, s);
-    else
-      sum += oracle_decoder(o, in, ray, s);
+    if (o->t->batch.hit[r][s / 64] >> s % 64 & 1) {
+      oracle_inputs(o, x, o->t->batch.ray[r].direction, in);
+      if (o->t->model.config.along)
+        oracle_decoder_along(o, in, decoded++, layer, ray, s);
+      else
+        sum += oracle_decoder(o, in, ray, s);
+    }
+    oracle_slow(o, &o->t->batch.ray[r], x, ray, s);
   }
   return sum;
 }

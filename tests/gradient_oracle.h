@@ -22,6 +22,7 @@ typedef struct oracle {
   dual *value;      /* [model.size] */
   double charge[3]; /* of a neuron of D1, C1, C2 that fires at any step of a sample */
   double *rounded;  /* the weights that the nets run with, [model.size]; NULL: those of `value` */
+  int *slowed;      /* samples near a camera, which learn slower; NULL: not wanted */
   double *nearest;  /* least distance of a membrane from its threshold; NULL: not wanted */
   uint64_t *signs;  /* a leak's slope has a random sign wherever it is used, drawn from this state; NULL: its own */
 } oracle;

@@ -57,16 +57,25 @@ void sf_dataset_ray(const sf_dataset *data, const sf_view *view, float px, float
   if (data->ndc) to_ndc(data, origin, direction);
 }
 
+double sf_dataset_distance(const sf_dataset *data)
+{
+  double sum = 0;
+  for (int v = 0; v < data->count; v++) {
+    const float *m = data->view[v].camera.to_world;
+    sum += sqrt((double)m[3] * (double)m[3] + (double)m[7] * (double)m[7] + (double)m[11] * (double)m[11]);
+  }
+  return data->count ? sum / data->count : 0;
+}
+
 int sf_dataset_pixels(const sf_dataset *data, int bound)
 {
-  double focal = 0, distance = 0, side = 0;
+  double focal = 0, side = 0;
   for (int v = 0; v < data->count; v++) {
     const sf_camera *c = &data->view[v].camera;
-    const double at[3] = {(double)c->to_world[3], (double)c->to_world[7], (double)c->to_world[11]};
     focal += sqrt((double)c->fx * (double)c->fy);
     side += (double)(c->width > c->height ? c->width : c->height) / data->count;
-    distance += sqrt(at[0] * at[0] + at[1] * at[1] + at[2] * at[2]);
   }
+  const double distance = data->count * sf_dataset_distance(data);
   const double points = data->ndc ? bound * side / (double)data->scale : 2 * bound * focal / fmax(distance, 1e-9);
   return (int)ceil(fmin(fmax(points, 1), 1 << 20));
 }

@@ -122,6 +122,9 @@ enum { SF_CAMERA_SIDE = 8192 /* pixels */, SF_CAMERA_TEXT = 22 * 16 };
 sf_status sf_camera_parse(const char *text, sf_camera *camera);
 void sf_camera_print(const sf_camera *camera, char text[SF_CAMERA_TEXT]);
 
+/* Mean distance of the cameras from the origin, model units; 0 without views. */
+double sf_dataset_distance(const sf_dataset *data);
+
 /* Points along an edge of [-bound, bound]^3, model units, that lie a pixel apart where the views see the middle of the
  * box: focal length over distance from the origin, in the mean of all views; with NDC, where a picture spans 2 * scale,
  * its longer side over that; 1 at least, 1 << 20 at most. */

@@ -11,6 +11,7 @@ sf_train_options sf_train_defaults(void)
                               .search_rate = 1,
                               .opaque = 0.5,
                               .undecoded = 0.01,
+                              .near_camera = 0.5,
                               .stage1 = 2500,
                               .stage2 = 7500,
                               .seed = 1,

@@ -105,6 +105,7 @@ static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundl
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
     ray_in(p, &batch->ray[r], w);
     sf_loss_ray(p, &batch->ray[r], batch->delta + batch->ray[r].lane, &w->ray, &g->sums);
+    sf_near_slow(t, p, &batch->ray[r], batch->x, batch->ray[r].lane, SF_BLOCK, &w->ray);
     ray_out(p, &batch->ray[r], w);
   }
   sf_count_spikes(t, 0, p->steps, block, lanes < SF_BLOCK ? lanes : SF_BLOCK, g);

@@ -108,6 +108,15 @@ sf_status sf_ray_work_create(sf_ray_work *work, int samples);
 void sf_loss_ray(const sf_loss_plan *plan, const sf_ray *ray, const float *delta, sf_ray_work *work,
                  sf_loss_sums *sums);
 
+/* How far from a camera samples learn as all others do, model units; 0: everywhere. */
+float sf_near_camera(const sf_dataset *data, const sf_train_options *options);
+/* The weight in (0,1] of the gradients of a sample of the ray. x: its position in [0,1]^3, axes `stride` apart. */
+float sf_near_weight(const sf_trainer *t, const sf_ray *ray, const float *x, int stride);
+/* Weighs the gradients of the ray's densities and colours. x: positions in blocks of [3][block]; lane: the ray's first.
+ */
+void sf_near_slow(const sf_trainer *t, const sf_loss_plan *p, const sf_ray *ray, const float *x, int lane, int block,
+                  sf_ray_work *w);
+
 /* What one of the GROUPS parts of a batch adds up. */
 typedef struct sf_group {
   void *grad; /* sf_backbone.grad_bytes, floats */
@@ -205,6 +214,7 @@ struct sf_trainer {
   int averaged;
   float *density;     /* occupancy's running density times the width of its cascade's cells, [sf_config_cells] */
   sf_steps intervals; /* of this iteration's stride */
+  float near_camera;  /* sf_near_camera */
   sf_batch batch;
   sf_group group[GROUPS];
   float *grads;           /* the groups', one after another; of ranks twice as many behind them, for their sum */

@@ -29,6 +29,8 @@ typedef struct sf_train_options {
   double alpha;       /* weight of L_extra */
   double opaque;      /* by how many percent the error may grow at the end for one percent fewer samples, in and behind
                        * surfaces; the paper's objective has none */
+  double near_camera; /* samples nearer to a camera than this, times the cameras' mean distance from the centre, learn
+                       * slower; not in NDC, nor with the paper's objective */
   int stage1, stage2; /* iterations; ignored when minutes > 0 */
   double minutes;     /* time budget of both stages, a quarter for stage I; 0 = iterations */
   uint64_t seed;

@@ -120,6 +120,7 @@ static sf_status create(sf_trainer *t, const char *resume)
   t->moment2 = sf_aligned_alloc(bytes);
   if (!t->grad || !t->moment1 || !t->moment2)
     return sf_fail(SF_E_MEMORY, "train: no memory for %zu parameters", t->model.size);
+  t->near_camera = sf_near_camera(t->data, &t->options);
   SF_TRY(sf_workers_create(t));
   SF_TRY(t->backbone->create(t));
   t->stage = stage1_weight(t) > 0 ? 1 : 2;

@@ -81,6 +81,8 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
     whole.count = vm->ray[r].count;
     ray_in(t, p, r, w);
     sf_loss_ray(p, &whole, t->intervals.length, &w->ray, &g->sums); /* equal intervals */
+    const sf_vm_ray_samples *from = &vm->ray[r];
+    sf_near_slow(t, p, &whole, vm->part[from->part].x, from->first, 1, &w->ray);
     ray_out(t, p, r, w);
     g->wild |= wild(vm->part[vm->ray[r].part].slope + vm->ray[r].first, whole.count);
   }
