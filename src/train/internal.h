@@ -108,9 +108,9 @@ sf_status sf_ray_work_create(sf_ray_work *work, int samples);
 void sf_loss_ray(const sf_loss_plan *plan, const sf_ray *ray, const float *delta, sf_ray_work *work,
                  sf_loss_sums *sums);
 
-/* How far from a camera samples learn as all others do, model units; 0: everywhere. */
+/* Samples nearer to their camera than this learn slower; model units, 0: none do. */
 float sf_near_camera(const sf_dataset *data, const sf_train_options *options);
-/* The weight in (0,1] of the gradients of a sample of the ray. x: its position in [0,1]^3, axes `stride` apart. */
+/* The weight in [0,1] of the gradients of a sample of the ray. x: its position in [0,1]^3, axes `stride` apart. */
 float sf_near_weight(const sf_trainer *t, const sf_ray *ray, const float *x, int stride);
 /* Weighs the gradients of the ray's densities and colours. x: positions in blocks of [3][block]; lane: the ray's first.
  */

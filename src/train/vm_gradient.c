@@ -78,13 +78,13 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
     sf_ray whole = t->batch.ray[r];
-    whole.count = vm->ray[r].count;
+    const sf_vm_ray_samples *from = &vm->ray[r];
+    whole.count = from->count;
     ray_in(t, p, r, w);
     sf_loss_ray(p, &whole, t->intervals.length, &w->ray, &g->sums); /* equal intervals */
-    const sf_vm_ray_samples *from = &vm->ray[r];
     sf_near_slow(t, p, &whole, vm->part[from->part].x, from->first, 1, &w->ray);
     ray_out(t, p, r, w);
-    g->wild |= wild(vm->part[vm->ray[r].part].slope + vm->ray[r].first, whole.count);
+    g->wild |= wild(vm->part[from->part].slope + from->first, whole.count);
   }
   if (bundle->blocks) sf_count_spikes(t, 1, p->steps, &block->net, lanes < SF_BLOCK ? lanes : SF_BLOCK, g);
   for (int i = 0; i < bundle->blocks; i++) {

@@ -110,8 +110,8 @@ static sf_option *tuning(train_arguments *a, sf_option *o)
       {"--lr-net", 0, SF_ARG_DOUBLE, &t->lr_net, 1e-8, 10, NULL, "R", "Adam's rate for nets and leaks\t#"},
       {"--theta", 0, SF_ARG_DOUBLE, &a->theta, 1e-3, 1e3, NULL, "V", "firing threshold\t#"},
       {"--near-camera", 0, SF_ARG_DOUBLE, &t->near_camera, 0, 100, NULL, "D",
-       "what is nearer to a camera than D times the cameras' mean distance from the centre learns slower, with the "
-       "square of its distance, so that no clouds settle there; 0: as all else\t#"},
+       "what is nearer to a camera than D times the cameras' mean distance from the centre learns slower, the "
+       "nearer the slower, so that no clouds settle there; 0: all learn alike; not in NDC\t#"},
       {"--search-rate", 0, SF_ARG_DOUBLE, &t->search_rate, 0.01, 100, NULL, "R",
        "how fast the averages of the search forget; what it finds should not hang on it\t#"}};
   return sf_cli_add(o, list, COUNT(list));
