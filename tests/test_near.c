@@ -65,6 +65,11 @@ TEST(slower_with_the_square_of_the_distance)
     ck_assert_float_eq_tol(w.dsigma[1][s], 36 * share[s], 1e-4f);
     for (int c = 0; c < 3; c++) ck_assert_float_eq_tol(w.dcolour[1][3 * s + c], 72 * share[s], 1e-4f);
   }
+  const sf_ray shorter = {.origin = {0, 0, 1}, .direction = {0, 0, -1}, .count = 1};
+  t->near_camera = 0.75f;
+  sf_near_slow(t, &plan, &shorter, at, 0, 1, &w);
+  ck_assert_float_eq_tol(w.dsigma[1][0], 25.0f / 9, 1e-4f);
+  ck_assert_float_eq(w.dsigma[1][1], 36); /* at 0.5, but of the next ray */
   free(w.memory);
 }
 
