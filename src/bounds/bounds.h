@@ -136,6 +136,9 @@ typedef struct sf_picture_job {
   bool (*tick)(void *user, int done, int rows); /* before each row; false stops; may be NULL */
   void *user;
 } sf_picture_job;
+/* The first layer whose weights are not the model's, rounded and clipped; -1: none. Where sizes differ, as after a
+ * trim, or units are unknown, it cannot be told, and is -1. */
+int sf_other_weights(const sf_model *model, const fx_scene *scene);
 /* SF_E_UNSUPPORTED if the scene is not the plain export of this model: other sizes or weights, unknown units. */
 sf_status sf_picture_budget_check(const sf_picture_job *job);
 /* `rays` random pixels of one view (seeded), rendered once per row. The row "none" must be the core's picture bit for

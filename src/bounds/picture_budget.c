@@ -156,6 +156,14 @@ static bool same_sizes(const sf_model *model, const fx_scene *scene)
          (planes ? same_planes : same_grid)(model, scene);
 }
 
+int sf_other_weights(const sf_model *model, const fx_scene *scene)
+{
+  if (!same_sizes(model, scene)) return -1;
+  for (int l = fx_net_first_layer(&scene->net); l < SF_LAYERS; l++)
+    if (scene->units.current_scale[l] > 0 && !sf_exact_resembles(scene, model, l)) return l;
+  return -1;
+}
+
 sf_status sf_picture_budget_check(const sf_picture_job *job)
 {
   const fx_net *net = &job->scene->net;
@@ -164,11 +172,11 @@ sf_status sf_picture_budget_check(const sf_picture_job *job)
   for (int i = fx_net_first_layer(net); i < SF_LAYERS; i++)
     if (!(job->scene->units.current_scale[i] > 0))
       return sf_fail(SF_E_UNSUPPORTED, "%s: the unit of layer %s is not known", job->name, fx_layer_name(i));
-  for (int i = fx_net_first_layer(net); i < SF_LAYERS; i++)
-    if (!sf_exact_resembles(job->scene, job->model, i))
-      return sf_fail(SF_E_UNSUPPORTED, "%s: the weights of layer %s are not those of the model it is compared with",
-                     job->name, fx_layer_name(i));
-  return sf_ok();
+  const int other = sf_other_weights(job->model, job->scene);
+  return other < 0
+             ? sf_ok()
+             : sf_fail(SF_E_UNSUPPORTED, "%s: the weights of layer %s are not those of the model it is compared with",
+                       job->name, fx_layer_name(other));
 }
 
 sf_status sf_picture_budget_make(const sf_picture_job *job, sf_picture_budget *budget)

@@ -2,6 +2,7 @@
  * neurons. */
 #include "page/page.h"
 #include "base/sha256.h"
+#include "bounds/bounds.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -107,9 +108,16 @@ static sf_status gather_pictures(sf_page *page)
   return sf_counts_compare(&page->golden.counts, "picture", &page->report->measure.core, "audit");
 }
 
-static bool is_model_of(const sf_page *page, const sf_model *model)
+/* Another training of the same sizes would show its own PSNR. */
+static sf_status check_model(const sf_page *page, const sf_model *model)
 {
-  return page->scene->net.steps <= model->config.steps && page->data->scale == model->config.scale;
+  if (page->scene->net.steps > model->config.steps || page->data->scale != model->config.scale)
+    return sf_fail(SF_E_RANGE, "%s: not the model of this scene (T %d, scale %g)", page->model, model->config.steps,
+                   (double)model->config.scale);
+  const int other = sf_other_weights(model, page->scene);
+  return other < 0 ? sf_ok()
+                   : sf_fail(SF_E_RANGE, "%s: not the model of this scene (other weights in layer %s)", page->model,
+                             fx_layer_name(other));
 }
 
 static sf_status float_quality(sf_page *page, const sf_model *model)
@@ -133,14 +141,13 @@ static sf_status gather_float(sf_page *page)
   page->psnr_float = NAN;
   if (!page->model) return sf_ok();
   SF_TRY(sf_model_load(&model, page->model));
-  sf_status status = sf_ok();
-  if (is_model_of(page, &model)) {
+  sf_status status = check_model(page, &model);
+  if (!status.code) {
     page->trained_steps = model.config.steps;
     status = sf_sha256_file(page->model, page->model_sha256);
     if (status.code == SF_OK && page->view->image.rgba) status = float_quality(page, &model);
-  } else if (!page->model_optional) {
-    status = sf_fail(SF_E_RANGE, "%s: not the model of this scene (T %d, scale %g)", page->model, model.config.steps,
-                     (double)model.config.scale);
+  } else if (page->model_optional) {
+    status = sf_ok();
   }
   sf_model_free(&model);
   return status;

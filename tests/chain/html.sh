@@ -22,6 +22,20 @@ make_page() {
   [ "$(stat -c %s "$work/page.html")" -lt 3000000 ] || fail "the page is larger than 3 MB"
 }
 
+# The PSNR of the float model stands on the page of its own scene alone.
+compare_models() {
+  local scene=$work/scene other=$work/other.safetensors
+  audit() { "$bin/energy_audit" "$scene/scene.snn" "$scene" --view 1 --html "$work/other.html" --quiet "$@" >/dev/null 2>"$work/err"; }
+  grep -q 'model SHA-256' "$work/page.html" || fail "the page does not name the model beside the scene"
+  "$bin/sf_train" "$scene" -o "$other" --seed 2 --stage1 20 --stage2 20 --samples 2048 --levels 6 --log2-hash 12 \
+    --finest-res 64 --lattice 128 --occ-res 32 --quiet --json >/dev/null
+  audit --model "$other" && fail "a model of another training was taken"
+  grep -qF "$other: not the model of this scene (other weights in layer D1)" "$work/err" || fail "not said: $(cat "$work/err")"
+  mv "$other" "$scene/model.safetensors"
+  audit || fail "a model of another training lies beside the scene: $(cat "$work/err")"
+  ! grep -q 'model SHA-256' "$work/other.html" || fail "the page has a model of another training"
+}
+
 # White space and escapes aside, the JSON inside the page is the JSON of the program.
 compare_json() {
   sed -n 's|.*<script type="application/json" id="audit-json">\(.*\)</script>.*|\1|p' "$work/page.html" |
@@ -58,6 +72,7 @@ if [ $# -ge 2 ]; then
 else
   make_page
   compare_json
+  compare_models
   if command -v xmllint >/dev/null; then
     xmllint --noout --huge "$work/page.html" || fail "not well-formed"
   else
