@@ -220,7 +220,7 @@ test: $(TESTS:%=$B/tests/%) all ## the C tests alone
 	@tests/run.sh $B $(TESTS)
 
 LONG_PROGRAMS := asic/lookups coverage_report tests/bench tests/bench_field # of long targets alone: they have to build
-check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) firmware faults board-sim installable $B/tests/exr_to_ppm $(LONG_PROGRAMS:%=$B/%) ## every test, lint, co-simulation, planted faults, generated files
+check: all lint gen-check $(TESTS:%=$B/tests/%) $(FUZZ_REPLAYS) fuzz-single firmware faults board-sim installable $B/tests/exr_to_ppm $(LONG_PROGRAMS:%=$B/%) ## every test, lint, co-simulation, planted faults, generated files
 	@tests/run.sh $B $(CHAIN_TESTS) $(TESTS)
 
 SAMPLES ?= 10000000

@@ -3,6 +3,7 @@
 #define SF_TESTS_FUZZ_SINGLE_OMP_H
 typedef int omp_lock_t;
 #define omp_get_max_threads() 1
+#define omp_get_num_procs() 1
 #define omp_get_thread_num() 0
 #define omp_set_num_threads(threads) ((void)(threads))
 #define omp_init_lock(lock) ((void)(lock))
