@@ -34,7 +34,7 @@ fuzz: ## fuzz every file reader with clang, FUZZ_TIME=60 seconds each, FUZZ_JOBS
 	@tests/fuzz/run.sh --installed $(CLANG)
 	@$(MAKE) $B/tests/fuzz/seeds
 	@$(MAKE) B=$B/fuzz $(SAME_ARCH) CC=$(CLANG) OPT=-O1 SAN="$(FUZZ_SAN)" \
-	  CFLAGS="-fsanitize=fuzzer-no-link -fno-openmp -Itests/fuzz/single -Wno-unknown-pragmas" $(FUZZ:%=$B/fuzz/bin/fuzz_%)
+	  CFLAGS="-fsanitize=fuzzer-no-link -fno-openmp -Itests/fuzz/single -Wno-unknown-pragmas -Wno-unused-function" $(FUZZ:%=$B/fuzz/bin/fuzz_%)
 	@tests/fuzz/run.sh $B $(FUZZ_TIME) $(FUZZ_JOBS) $(FUZZ)
 
 # tests/fuzz/single/omp.h has everything of OpenMP that the library calls. `make check` has no clang, so it asks CC.
