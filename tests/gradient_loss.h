@@ -63,6 +63,21 @@ static inline dual oracle_tail(const oracle_ray *ray, int step, double stop)
   return creal(light) > stop + 1e-3 ? 0 : sum;
 }
 
+/* Mip-NeRF 360, eq. 15, pair by pair: sum w w |s - s| of the middles, and a third of sum w^2 (end - start). */
+static inline dual oracle_distortion(const oracle_ray *ray, const oracle_image *im)
+{
+  dual sum = 0;
+  for (int i = 0; i < ray->count; i++) {
+    const double *a = ray->edge[i];
+    sum += im->weight[i] * im->weight[i] * (a[1] - a[0]) / 3;
+    for (int j = 0; j < ray->count; j++) {
+      const double *b = ray->edge[j];
+      sum += im->weight[i] * im->weight[j] * fabs((a[0] + a[1]) / 2 - (b[0] + b[1]) / 2);
+    }
+  }
+  return sum;
+}
+
 /* What steps behind prefix t add: ||w(tail)|| / ||W|| + ||tail of C|| / ||C_T||. */
 static inline dual oracle_extra(const oracle *o, const oracle_ray *ray, int t, const oracle_image *full)
 {
@@ -99,7 +114,8 @@ static inline dual oracle_losses(const oracle *o, const sf_ray *pixel, const ora
     oracle_composite(ray, ray->sigma[t - 1], ray->colour[t - 1], pixel->background, &im);
     sum += (double)p->weight[t - 1] * oracle_error(im.rgb, gt);
     if (t == p->regular_at)
-      sum += oracle_regular(ray, t - 1, &im, gt) + (double)p->opaque * oracle_tail(ray, t - 1, p->stop);
+      sum += oracle_regular(ray, t - 1, &im, gt) + (double)p->opaque * oracle_tail(ray, t - 1, p->stop) +
+             (double)p->distortion * oracle_distortion(ray, &im);
     if (p->full && t == p->t_r) sum += (double)p->distill * oracle_error(im.rgb, full.rgb);
   }
   if (p->full && p->extra > 0)
@@ -109,8 +125,7 @@ static inline dual oracle_losses(const oracle *o, const sf_ray *pixel, const ora
 
 /* ---- the batch as it was drawn ---- */
 
-/* A sample near a camera learns slower: x is its position. Where its loss stands is unchanged. */
-static inline void oracle_slow(const oracle *o, const sf_ray *from, const double x[3], oracle_ray *ray, int s)
+static inline double oracle_away(const oracle *o, const sf_ray *from, const double x[3])
 {
   const sf_steps *box = &o->t->intervals;
   double away = 0;
@@ -118,7 +133,20 @@ static inline void oracle_slow(const oracle *o, const sf_ray *from, const double
     const double at = (double)box->low[a] + x[a] * ((double)box->high[a] - (double)box->low[a]);
     away += pow(at - (double)from->origin[a], 2);
   }
-  const double weight = pow(sqrt(away) / (double)o->t->near_camera, 2);
+  return sqrt(away);
+}
+
+/* The interval of a sample at x, whose length is known. */
+static inline void oracle_edges(const oracle *o, const sf_ray *from, const double x[3], oracle_ray *ray, int s)
+{
+  for (int end = 0; end < 2; end++)
+    ray->edge[s][end] = (oracle_away(o, from, x) + (end - 0.5) * ray->delta[s]) / (double)o->t->distortion_unit;
+}
+
+/* A sample near a camera learns slower: x is its position. Where its loss stands is unchanged. */
+static inline void oracle_slow(const oracle *o, const sf_ray *from, const double x[3], oracle_ray *ray, int s)
+{
+  const double weight = pow(oracle_away(o, from, x) / (double)o->t->near_camera, 2);
   if (!(weight < 1)) return;
   if (o->slowed) ++*o->slowed;
   for (int t = 0; t < o->plan->steps; t++) {
@@ -149,6 +177,7 @@ static inline dual oracle_grid_ray(const oracle *o, int r, oracle_ray *ray)
       oracle_nets_along(o, feature, sh, s, layer, ray, s);
     else
       sum += oracle_nets(o, feature, sh, ray, s);
+    oracle_edges(o, from, x, ray, s);
     oracle_slow(o, from, x, ray, s);
   }
   return sum;
@@ -178,6 +207,7 @@ static inline dual oracle_planes_ray(const oracle *o, int r, oracle_ray *ray)
       else
         sum += oracle_decoder(o, in, ray, s);
     }
+    oracle_edges(o, &o->t->batch.ray[r], x, ray, s);
     oracle_slow(o, &o->t->batch.ray[r], x, ray, s);
   }
   return sum;

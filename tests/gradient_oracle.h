@@ -30,6 +30,7 @@ typedef struct oracle {
 typedef struct oracle_ray {
   int count;
   double delta[RAY_SAMPLES];
+  double edge[RAY_SAMPLES][2]; /* where the interval starts and ends, in units of L_distortion */
   dual sigma[SF_T_MAX][RAY_SAMPLES], colour[SF_T_MAX][RAY_SAMPLES][3];
 } oracle_ray;
 

@@ -207,6 +207,7 @@ static void check_plan(rig *r, const char *what, sf_loss_plan p)
   sf_gradient_run(t, &p, &mean, firing);
   r->firing = firing[1];
   ck_assert_int_eq(mean.tail > 0, p.opaque > 0);
+  ck_assert_int_eq(mean.distortion > 0, p.distortion > 0);
   const double e_tau = sf_gradient_leaks(t, &p, &mean);
   t->backbone->update(t);
   r->o.plan = &p;
@@ -249,6 +250,9 @@ static void check_terms(rig *r)
   check_plan(r, "norm, cosine and sparsity", p);
   p.opaque = 1e-2f;
   check_plan(r, "L_opaque", p);
+  p.opaque = 0;
+  p.distortion = 1;
+  check_plan(r, "L_distortion", p);
   p = plan_full();
   p.distill = 1;
   check_plan(r, "L_distill", p);
@@ -265,6 +269,7 @@ static void check_terms(rig *r)
   p.regular_at = STEPS;
   p.extra = 0.1f;
   p.opaque = 1e-3f;
+  p.distortion = 0.1f;
   p.charge = 0.5f;
   check_plan(r, "all terms", p);
 }
@@ -353,6 +358,7 @@ LOOP_TEST(the_twins, 2)
   check_plan(&r, "squared error", p);
   p.regular_at = 1;
   p.opaque = _i ? 1e-2f : 0; /* no ray of this grid's twin has a tail */
+  p.distortion = 0.1f;
   check_plan(&r, "all terms", p);
   rig_end(&r);
 }
@@ -373,6 +379,7 @@ LOOP_TEST(steps_along_rays, 6)
   ck_assert_int_gt(longest, 2);
   p.regular_at = 1;
   p.opaque = 1e-2f;
+  p.distortion = 0.1f;
   check_plan(&r, "all terms", p);
   rig_end(&r);
 }

@@ -12,6 +12,7 @@ sf_train_options sf_train_defaults(void)
                               .opaque = 0.5,
                               .undecoded = 0.01,
                               .near_camera = 0.5,
+                              .distortion = 0.001,
                               .stage1 = 2500,
                               .stage2 = 7500,
                               .seed = 1,

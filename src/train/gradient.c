@@ -179,6 +179,7 @@ static void add_sums(sf_loss_sums *to, const sf_loss_sums *x, double mean)
 {
   for (int t = 0; t < SF_T_MAX; t++) to->prefix[t] += mean * x->prefix[t];
   to->regular += mean * x->regular;
+  to->distortion += mean * x->distortion;
   to->tail += mean * x->tail;
   to->extra_floor += mean * x->extra_floor;
   to->extra_ceil += mean * x->extra_ceil;

@@ -104,6 +104,9 @@ static void bundle_gradient(sf_trainer *t, const sf_loss_plan *p, const sf_bundl
   memset(w->dcolour, 0, (size_t)bundle->blocks * SF_T_MAX * 3 * SF_BLOCK * sizeof(float));
   for (int r = bundle->ray; r < bundle->ray + bundle->rays; r++) {
     ray_in(p, &batch->ray[r], w);
+    if (p->distortion > 0)
+      sf_distortion_place(t, &batch->ray[r], batch->x, batch->ray[r].lane, SF_BLOCK, batch->delta + batch->ray[r].lane,
+                          &w->ray);
     sf_loss_ray(p, &batch->ray[r], batch->delta + batch->ray[r].lane, &w->ray, &g->sums);
     sf_near_slow(t, p, &batch->ray[r], batch->x, batch->ray[r].lane, SF_BLOCK, &w->ray);
     ray_out(p, &batch->ray[r], w);

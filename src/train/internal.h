@@ -66,11 +66,12 @@ typedef struct sf_loss_plan {
   int t_f, t_c, t_r;      /* around t^; in a full iteration */
   double d;               /* t^ - t_f */
   float inverse_rays;
-  float stop;    /* a ray ends where less of its light is left: the logarithm of that share */
-  float opaque;  /* price of a sample in a ray's tail (L_opaque), 0 = off */
-  float extra;   /* weight of L_extra, 0 = off */
-  float charge;  /* of reads of weights, 0 = off */
-  float distill; /* weight of L_distill */
+  float stop;       /* a ray ends where less of its light is left: the logarithm of that share */
+  float distortion; /* weight of L_distortion, 0 = off */
+  float opaque;     /* price of a sample in a ray's tail (L_opaque), 0 = off */
+  float extra;      /* weight of L_extra, 0 = off */
+  float charge;     /* of reads of weights, 0 = off */
+  float distill;    /* weight of L_distill */
   float k_sigma, k_colour;
 } sf_loss_plan;
 
@@ -92,7 +93,7 @@ static inline int sf_loss_from(const sf_loss_plan *p)
 
 typedef struct sf_loss_sums {
   double prefix[SF_T_MAX]; /* squared error of the prefixes that are composited */
-  double regular, tail, extra_floor, extra_ceil, distill;
+  double regular, distortion, tail, extra_floor, extra_ceil, distill;
   double g_sigma_leak, g_colour_leak; /* of L_extra's decay factors, with respect to k */
 } sf_loss_sums;
 /* Of an iteration whose sums are means over its rays: the loss but for L_charge. e_tau: sum of the neurons' e^tau. */
@@ -101,6 +102,7 @@ double sf_loss_total(const sf_loss_plan *plan, const sf_loss_sums *mean, double 
 /* Work arrays of one ray: prefix outputs and their gradients, [T][n] and [T][n][3]; `spare` for the loss. */
 typedef struct sf_ray_work {
   float *sigma[SF_T_MAX], *colour[SF_T_MAX], *dsigma[SF_T_MAX], *dcolour[SF_T_MAX], *spare[6];
+  float *place, *span; /* [n] distances from the camera and lengths of the samples' intervals, for L_distortion */
   float *memory;
 } sf_ray_work;
 sf_status sf_ray_work_create(sf_ray_work *work, int samples);
@@ -110,12 +112,24 @@ void sf_loss_ray(const sf_loss_plan *plan, const sf_ray *ray, const float *delta
 
 /* Samples nearer to their camera than this learn slower; model units, 0: none do. */
 float sf_near_camera(const sf_dataset *data, const sf_train_options *options);
+/* The square of a sample's distance from its camera, model units. x: its position in [0,1]^3, axes `stride` apart. */
+float sf_squared_distance(const sf_trainer *t, const sf_ray *ray, const float *x, int stride);
 /* The weight in [0,1] of the gradients of a sample of the ray. x: its position in [0,1]^3, axes `stride` apart. */
 float sf_near_weight(const sf_trainer *t, const sf_ray *ray, const float *x, int stride);
 /* Weighs the gradients of the ray's densities and colours. x: positions in blocks of [3][block]; lane: the ray's first.
  */
 void sf_near_slow(const sf_trainer *t, const sf_loss_plan *p, const sf_ray *ray, const float *x, int lane, int block,
                   sf_ray_work *w);
+
+/* L_distortion: what its distances are measured in, model units: the cameras' mean distance, at least 1;
+ * in NDC the box's depth. */
+float sf_distortion_unit(const sf_dataset *data);
+/* The ray's place and span; x, lane and block as above. delta[ray->count]: lengths of the samples' intervals. */
+void sf_distortion_place(const sf_trainer *t, const sf_ray *ray, const float *x, int lane, int block,
+                         const float *delta, sf_ray_work *w);
+/* Of a ray of n samples: its value; adds scale times its gradient to dsigma[n]. behind: the light that is left. */
+double sf_distortion_add(int n, const float *weight, float behind, const float *delta, float scale, sf_ray_work *w,
+                         float *dsigma);
 
 /* What one of the GROUPS parts of a batch adds up. */
 typedef struct sf_group {
@@ -215,6 +229,7 @@ struct sf_trainer {
   float *density;     /* occupancy's running density times the width of its cascade's cells, [sf_config_cells] */
   sf_steps intervals; /* of this iteration's stride */
   float near_camera;  /* sf_near_camera */
+  float distortion_unit;
   sf_batch batch;
   sf_group group[GROUPS];
   float *grads;           /* the groups', one after another; of ranks twice as many behind them, for their sum */

@@ -11,7 +11,7 @@ static const float tail_log = -0.10536052f; /* ln 0.9: the tail of a ray begins 
 
 sf_status sf_ray_work_create(sf_ray_work *w, int samples)
 {
-  size_t n = (size_t)samples, total = n * (SF_T_MAX * 8 + 6 * 3);
+  size_t n = (size_t)samples, total = n * (SF_T_MAX * 8 + 6 * 3 + 2);
   float *at = w->memory = sf_aligned_alloc(total * sizeof(float));
   if (!at) return sf_fail(SF_E_MEMORY, "train: no memory for a ray of %d samples", samples);
   for (int t = 0; t < SF_T_MAX; t++) {
@@ -21,6 +21,7 @@ sf_status sf_ray_work_create(sf_ray_work *w, int samples)
     w->dcolour[t] = at, at += 3 * n;
   }
   for (int i = 0; i < 6; i++) w->spare[i] = at, at += 3 * n;
+  w->place = at, w->span = at + n;
   return sf_ok();
 }
 
@@ -200,6 +201,9 @@ static void add_prefix(const sf_loss_plan *p, const sf_ray *ray, const float *de
   if (t != p->regular_at) return;
   sums->regular += add_regular(ray, im, p->inverse_rays, grgb);
   sums->regular += add_sparsity(ray->count, w->sigma[t - 1], p->inverse_rays, w->dsigma[t - 1]);
+  if (p->distortion > 0)
+    sums->distortion += sf_distortion_add(ray->count, im->weight, im->behind, delta, p->distortion * p->inverse_rays, w,
+                                          w->dsigma[t - 1]);
   if (p->opaque > 0)
     sums->tail += add_tail(p->stop, ray->count, w->sigma[t - 1], delta, p->opaque * p->inverse_rays, w->dsigma[t - 1]);
 }
@@ -231,7 +235,7 @@ void sf_loss_ray(const sf_loss_plan *p, const sf_ray *ray, const float *delta, s
 
 double sf_loss_total(const sf_loss_plan *p, const sf_loss_sums *mean, double e_tau)
 {
-  double loss = mean->regular + p->opaque * mean->tail;
+  double loss = mean->regular + p->distortion * mean->distortion + p->opaque * mean->tail;
   for (int t = 0; t < p->steps; t++) loss += p->weight[t] * mean->prefix[t];
   if (!p->full) return loss;
   const double extra = (1 - p->d) * mean->extra_floor + p->d * mean->extra_ceil + e_tau;

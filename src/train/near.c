@@ -12,7 +12,7 @@ float sf_near_camera(const sf_dataset *data, const sf_train_options *options)
   return none ? 0 : (float)(options->near_camera * sf_dataset_distance(data));
 }
 
-float sf_near_weight(const sf_trainer *t, const sf_ray *ray, const float *x, int stride)
+float sf_squared_distance(const sf_trainer *t, const sf_ray *ray, const float *x, int stride)
 {
   const sf_steps *box = &t->intervals;
   float away = 0;
@@ -20,7 +20,12 @@ float sf_near_weight(const sf_trainer *t, const sf_ray *ray, const float *x, int
     const float d = box->low[a] + x[a * stride] * (box->high[a] - box->low[a]) - ray->origin[a];
     away += d * d;
   }
-  const float weight = away / (t->near_camera * t->near_camera);
+  return away;
+}
+
+float sf_near_weight(const sf_trainer *t, const sf_ray *ray, const float *x, int stride)
+{
+  const float weight = sf_squared_distance(t, ray, x, stride) / (t->near_camera * t->near_camera);
   return weight < 1 ? weight : 1;
 }
 

@@ -31,6 +31,8 @@ typedef struct sf_train_options {
                        * surfaces; the paper's objective has none */
   double near_camera; /* samples nearer to a camera than this, times the cameras' mean distance from the centre, learn
                        * slower; not in NDC, nor with the paper's objective */
+  double distortion;  /* weight of L_distortion, which draws the weights of a ray together; not with the paper's
+                       * objective */
   int stage1, stage2; /* iterations; ignored when minutes > 0 */
   double minutes;     /* time budget of both stages, a quarter for stage I; 0 = iterations */
   uint64_t seed;

@@ -121,6 +121,7 @@ static sf_status create(sf_trainer *t, const char *resume)
   if (!t->grad || !t->moment1 || !t->moment2)
     return sf_fail(SF_E_MEMORY, "train: no memory for %zu parameters", t->model.size);
   t->near_camera = sf_near_camera(t->data, &t->options);
+  t->distortion_unit = sf_distortion_unit(t->data);
   SF_TRY(sf_workers_create(t));
   SF_TRY(t->backbone->create(t));
   t->stage = stage1_weight(t) > 0 ? 1 : 2;
@@ -225,6 +226,7 @@ static sf_loss_plan make_plan(const sf_trainer *t)
                     .k_colour = sf_sigmoid(leak[4])};
   const bool learned = searching(t);
   p.opaque = sf_tail_price(t);
+  if (t->options.objective != SF_OBJECTIVE_PAPER) p.distortion = (float)t->options.distortion;
   if (final_part(t) && t->model.config.net != SF_NET_ANN) p.charge = (float)t->options.charge;
   if (!learned || scaled(t)) {
     const int wanted = learned ? T : t->model.t_r;

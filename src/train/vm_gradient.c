@@ -81,6 +81,8 @@ void sf_vm_bundle(sf_trainer *t, const sf_loss_plan *p, const sf_bundle *bundle,
     const sf_vm_ray_samples *from = &vm->ray[r];
     whole.count = from->count;
     ray_in(t, p, r, w);
+    if (p->distortion > 0)
+      sf_distortion_place(t, &whole, vm->part[from->part].x, from->first, 1, t->intervals.length, &w->ray);
     sf_loss_ray(p, &whole, t->intervals.length, &w->ray, &g->sums); /* equal intervals */
     sf_near_slow(t, p, &whole, vm->part[from->part].x, from->first, 1, &w->ray);
     ray_out(t, p, r, w);

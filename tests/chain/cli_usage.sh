@@ -63,10 +63,12 @@ number sf_train --search-rate 0 -1 101 nan x
 number sf_train --opaque -1 11 nan x
 number sf_train --undecoded -1 0.11 nan x
 number sf_train --near-camera -1 101 nan x
+number sf_train --distortion -1 101 nan x
 number sf_train --stop 0 1e-7 0.051 nan x
 usage "--opaque has no effect beside --objective paper" sf_train d -o out --objective paper --opaque 0.1
 usage "--undecoded has no effect beside --objective paper" sf_train d -o out --backbone tensorf --objective paper --undecoded 0.1
 usage "--near-camera has no effect beside --objective paper" sf_train d -o out --objective paper --near-camera 1
+usage "--distortion has no effect beside --objective paper" sf_train d -o out --objective paper --distortion 1
 usage --price sf_train d -o out --price euros
 usage --objective sf_train d -o out --objective none
 usage "beside a target" sf_train d -o out --target-loss 0.1 --beta 1e-6

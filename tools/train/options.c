@@ -84,7 +84,7 @@ static sf_status check_effect(train_arguments *a)
                            *const budget[] = {"--beta", NULL}, *const search[] = {"--target-loss", "--target-saving",
                                                                                   "--price",       "--objective",
                                                                                   "--search-rate", NULL};
-  static const char *const rays[] = {"--opaque", "--undecoded", "--near-camera", NULL};
+  static const char *const rays[] = {"--opaque", "--undecoded", "--near-camera", "--distortion", NULL};
   static const char *const spiking[] = {"--charge", "--steps-along-ray", NULL};
   static const char *const steps[] = {"--fixed-steps", "--charge", NULL}, *const mode[] = {"--input-mode", NULL};
   static const char fine_tune[] = "has no effect beside --fine-tune: the model has its own";

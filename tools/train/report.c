@@ -146,6 +146,7 @@ static cJSON *make_summary(const train_arguments *a, const sf_model *m, const sf
   cJSON_AddNumberToObject(json, "charge", a->train.charge);
   cJSON_AddNumberToObject(json, "opaque", a->train.objective == SF_OBJECTIVE_PAPER ? 0 : a->train.opaque);
   cJSON_AddNumberToObject(json, "near_camera", a->train.objective == SF_OBJECTIVE_PAPER ? 0 : a->train.near_camera);
+  cJSON_AddNumberToObject(json, "distortion", a->train.objective == SF_OBJECTIVE_PAPER ? 0 : a->train.distortion);
   cJSON_AddNumberToObject(json, "stop", c->stop);
   if (sf_model_decodes(m)) cJSON_AddNumberToObject(json, "weight_stop", c->tensorf.weight_stop);
   cJSON_AddNumberToObject(json, "row_reads", s->row_reads);

@@ -112,6 +112,8 @@ static sf_option *tuning(train_arguments *a, sf_option *o)
       {"--near-camera", 0, SF_ARG_DOUBLE, &t->near_camera, 0, 100, NULL, "D",
        "what is nearer to a camera than D times the cameras' mean distance from the centre learns slower, the "
        "nearer the slower, so that no clouds settle there; 0: all learn alike; not in NDC\t#"},
+      {"--distortion", 0, SF_ARG_DOUBLE, &t->distortion, 0, 100, NULL, "L",
+       "weight of Mip-NeRF 360's distortion loss, which draws together what a ray sees; 0: none\t#"},
       {"--search-rate", 0, SF_ARG_DOUBLE, &t->search_rate, 0.01, 100, NULL, "R",
        "how fast the averages of the search forget; what it finds should not hang on it\t#"}};
   return sf_cli_add(o, list, COUNT(list));
