@@ -10,7 +10,7 @@
 
 float sf_distortion_unit(const sf_dataset *data)
 {
-  return data->ndc ? 2 : (float)fmax(sf_dataset_distance(data), 1);
+  return data->ndc ? 2 * data->scale : (float)fmax(sf_dataset_distance(data), 1);
 }
 
 void sf_distortion_place(const sf_trainer *t, const sf_ray *ray, const float *x, int lane, int block,
