@@ -12,7 +12,7 @@ usage="usage: quality.sh BUILD [options]
   --jobs N         runs at a time, one thread each (as many as processors)
   --out FOLDER     (BUILD/quality)
   --keep           the table of now is what later ones are compared with
-Results: FOLDER/quality.json and SCENE/{snn,ann}-SEED/. Finished runs are kept; runs with other options start again."
+Results: FOLDER/quality.json and SCENE/{snn,ann}-SEED/. Finished runs are kept. Those of another sf_train or with other options start again."
 
 die() { echo "quality: $1" >&2; exit "${2:-2}"; }
 [ $# -ge 1 ] || die "missing argument BUILD (see quality.sh --help)"
@@ -73,9 +73,9 @@ one() { # "NET SEED SCENE|DATA|OPTIONS"
   dir=$out/$scene/$net-$seed
   command="$data $options $common --net $net --seed $seed"
   [ "$net" = ann ] || command="$command${train:+ $train}"
-  if [ "$(cat "$dir/command" 2>/dev/null)" != "$command" ]; then rm -rf "$dir"; fi
+  if [ "$(cat "$dir/command" 2>/dev/null)" != "$trainer $command" ]; then rm -rf "$dir"; fi
   mkdir -p "$dir"
-  echo "$command" >"$dir/command"
+  echo "$trainer $command" >"$dir/command"
   if [ ! -s "$dir/train.json" ]; then
     # shellcheck disable=SC2086
     "$build/bin/sf_train" $command --threads 1 --quiet -o "$dir/model.safetensors" --log "$dir/train.jsonl" \
@@ -86,7 +86,8 @@ one() { # "NET SEED SCENE|DATA|OPTIONS"
   [ -z "$failed" ] || return 1
 }
 export -f one
-export build out common train started
+trainer=$(sha256sum <"$build/bin/sf_train" | cut -c1-16)
+export build out common train trainer started
 started=$(date +%s)
 common="--stage1 $stage1 --stage2 $stage2 --samples $samples --eval-views 4"
 list=$(list_scenes)

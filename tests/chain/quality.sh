@@ -4,8 +4,8 @@
 short=(--only simple --seeds "1 2" --stage1 20 --stage2 60 --samples 512 --out "$work/q")
 
 # Pictures of 32 pixels where the script would make some of 200.
-mkdir -p "$work/b/quality-data"
-ln -s "$build/bin" "$work/b/bin"
+mkdir -p "$work/b/quality-data" "$work/b/bin"
+ln -s "$build"/bin/* "$work/b/bin/"
 "$build/bin/sf_scene" simple -o "$work/b/quality-data/simple" --size 32 --train 8 --test 2 -q || fail "no scene"
 touch "$work/b/quality-data/simple/complete"
 
@@ -24,6 +24,12 @@ touch -d '2001-01-01' "$work/q/simple/snn-1/train.jsonl"
 run "${short[@]}" || fail "the second call: $(cat "$work/err")"
 [ "$(date -r "$work/q/simple/snn-1/train.jsonl" +%Y)" = 2001 ] || fail "a finished run ran again"
 [ "$(row | grep -o '(' | wc -l)" -ge 8 ] || fail "the kept table is not compared: $(row)"
+rm "$work/b/bin/sf_train"
+{ cat "$build/bin/sf_train" && echo; } >"$work/b/bin/sf_train" # another program, as after a change of a default
+chmod +x "$work/b/bin/sf_train"
+run "${short[@]}" || fail "another sf_train: $(cat "$work/err")"
+[ "$(date -r "$work/q/simple/snn-1/train.jsonl" +%Y)" != 2001 ] || fail "a run of another sf_train was kept"
+touch -d '2001-01-01' "$work/q/simple/snn-1/train.jsonl"
 run "${short[@]}" --train "--beta 1" || fail "other options: $(cat "$work/err")"
 [ "$(date -r "$work/q/simple/snn-1/train.jsonl" +%Y)" != 2001 ] || fail "a run of other options was kept"
 row | cut -d'|' -f6 | grep -q ' 1.00 ' || fail "beta = 1 does not learn one step: $(row)"
