@@ -2,7 +2,7 @@
  *   sum_ij w_i w_j |s_i - s_j| + 1/3 sum_i w_i^2 h_i,
  * charges a ray whose weights w lie apart: in clouds before a surface, and in surfaces that are soft. s is a sample's
  * distance from its camera and h the length of its interval, where the cameras' mean distance from the centre is 1.
- * The paper measures both by 1 / distance, which lets what is far away stay soft. */
+ * Mip-NeRF 360 measures both by 1 / distance, which lets what is far away stay soft. */
 #include "render/composite.h"
 #include "scene/scene.h"
 #include "train/internal.h"
