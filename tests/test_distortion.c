@@ -116,7 +116,7 @@ static bool is_heard(sf_train_options o)
   return memcmp(on->model.value, off->model.value, on->model.size * sizeof(float)) != 0;
 }
 
-/* In stage I and in the search, for both nets. The paper's objective has the paper's losses. */
+/* For both fields and both nets. The paper's objective has the paper's losses. */
 TEST(the_paper_has_none)
 {
   sf_train_options o = small_run();

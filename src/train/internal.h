@@ -226,10 +226,10 @@ struct sf_trainer {
   float *rounded;                  /* in fine-tuning: what sf_scales_round rounds, [model.size], else NULL */
   float *average;                  /* of `averaged` snapshots, [model.size]; NULL before the first */
   int averaged;
-  float *density;     /* occupancy's running density times the width of its cascade's cells, [sf_config_cells] */
-  sf_steps intervals; /* of this iteration's stride */
-  float near_camera;  /* sf_near_camera */
-  float distortion_unit;
+  float *density;        /* occupancy's running density times the width of its cascade's cells, [sf_config_cells] */
+  sf_steps intervals;    /* of this iteration's stride */
+  float near_camera;     /* sf_near_camera */
+  float distortion_unit; /* sf_distortion_unit */
   sf_batch batch;
   sf_group group[GROUPS];
   float *grads;           /* the groups', one after another; of ranks twice as many behind them, for their sum */
