@@ -14,16 +14,22 @@ usage "--frames has no effect without --solve" sf_data d --frames 20
 usage "--matching" sf_data d --solve -o out --matching some
 data "d: no JPEG or PNG picture is there" sf_data d --solve -o out && rm -r out
 data "cannot write" sf_data d --png absent/cameras.png
-# A pixel of these pictures: 2 * bound * 22.22 px of focal length / 3.22 of distance, at least the coarsest level.
-while read -r finest options; do
+# A pixel of these pictures: 2 * bound * 22.22 px of focal length / 3.22 of distance, at least the coarsest level. Equal
+# steps are a pixel long, or less: 13.8 sqrt(3) = 23.9 of 2 sqrt(3) / lattice units, even.
+while read -r finest lattice options; do
+  steps="steps of 2 sqrt(3) / $lattice"
+  [ "$lattice" != - ] || steps="steps of distance / 128"
   # shellcheck disable=SC2086
-  run sf_train d -o box.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8 --lattice 128 --threads 1 $options
-  check "sf_train $options" "finest level is not $finest" grep -q "finest level $finest," stdout.txt
+  run sf_train d -o box.safetensors --stage1 1 --stage2 1 --levels 2 --log2-hash 8 --threads 1 $options
+  check "sf_train $options" "not $steps, finest level $finest, but: $(head -n 1 stdout.txt)" \
+    grep -qF "$steps, finest level $finest," stdout.txt
 done <<'END'
-14 --base-res 2
-56 --base-res 2 --bound 4
-16
-77 --finest-res 77
+14 26 --base-res 2
+56 - --base-res 2 --bound 4
+56 26 --base-res 2 --bound 4 --dt-gamma 0
+16 26
+16 200 --lattice 200
+77 26 --finest-res 77
 END
 # A box that the pictures show more than, or little of, is told before anything is learned.
 while IFS='|' read -r said options; do

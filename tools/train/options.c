@@ -2,6 +2,7 @@
 #include "base/io.h"
 #include "cli/record.h"
 #include "field/field.h"
+#include <math.h>
 #include <omp.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,8 +13,17 @@ static const char *const apart[] = {"--output", "--threads", "--eval-views", "--
                                     "--resume", "--log",     "--summary",    "--json",          "--quiet",
                                     "--view",   NULL};
 
+/* The lattice whose equal steps are a pixel long, or a little shorter, as long as a ray has no more than it may have.
+ * It is even, so that twice the step is one, too. pixels: along an edge of the box. */
+static int lattice_of_pixels(int pixels, int bound)
+{
+  const int most = SF_STEPS_MAX / bound, lattice = 2 * (int)ceil(sqrt(3) / 2 * pixels / bound);
+  return lattice < SF_LATTICE_MIN ? SF_LATTICE_MIN : lattice > most ? most : lattice;
+}
+
 /* Sets the box, its cells, the steps through it and the finest level, unless an option sets them. A level finer than
- * the pixels costs time and learns noise. Without data, only the options count. */
+ * the pixels costs time and learns noise, and equal steps that are shorter than a pixel cost samples alone. Without
+ * data, only the options count. */
 static void set_box(train_arguments *a, const sf_dataset *data)
 {
   sf_config *c = &a->train.config;
@@ -23,6 +33,8 @@ static void set_box(train_arguments *a, const sf_dataset *data)
   if (pixels < c->finest_res) c->finest_res = pixels > c->base_res ? pixels : c->base_res;
   if (a->finest_res) c->finest_res = a->finest_res;
   if (a->gamma >= 0) c->dt_gamma = (float)a->gamma;
+  c->lattice = c->dt_gamma > 0 ? sf_config_default().lattice : lattice_of_pixels(pixels, c->bound);
+  if (a->lattice) c->lattice = a->lattice;
 }
 
 static bool any_transparent(const sf_dataset *data)
@@ -56,7 +68,7 @@ static void settle_space(train_arguments *a, const sf_dataset *data)
   if (c->dt_gamma > 0)
     printf("steps of distance / %g", 1 / (double)c->dt_gamma);
   else
-    printf("equal steps");
+    printf("steps of 2 sqrt(3) / %d", c->lattice);
   printf(", finest level %d, background %s\n", c->finest_res, name[a->train.background]);
   fflush(stdout);
 }

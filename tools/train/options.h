@@ -10,7 +10,7 @@ typedef struct train_arguments {
   const char *output, *log, *summary, *fine_tune;
   sf_train_options train;
   double scale, theta, checkpoint_minutes, gamma;
-  int bound, finest_res, occ_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits,
+  int bound, finest_res, lattice, occ_res, background, downscale, threads, eval_views, prefix_views, limit, weight_bits,
       leak_bits, grid_bits, view; /* port of the page, -1: none */
   int input_mode;                 /* 0: by the objective, else 1 + the sf_input_mode */
   bool resume, quiet, json, no_budget, along;

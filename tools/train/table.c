@@ -132,8 +132,9 @@ static sf_option *sizes(train_arguments *a, sf_option *o)
       {"--base-res", 0, SF_ARG_INT, &c->base_res, 2, 4096, NULL, "N", "resolution of the coarsest level\t#\t-"},
       {"--finest-res", 0, SF_ARG_INT, &a->finest_res, 2, 32768, NULL, "N",
        "resolution of the finest level; else a pixel of the pictures, at most 2048 x bound and 32768\tpixel\t-"},
-      {"--lattice", 0, SF_ARG_INT, &c->lattice, 16, 1024, NULL, "N",
-       "the shortest step is the diagonal of a box of bound 1 divided by this, at the finest\t#\t-"},
+      {"--lattice", 0, SF_ARG_INT, &a->lattice, 16, 1024, NULL, "N",
+       "the shortest step is the diagonal of a box of bound 1 divided by this, at the finest; else a pixel of the "
+       "pictures, at most 1024, and 1024 where steps grow\tpixel\t-"},
       {"--dt-gamma", 0, SF_ARG_DOUBLE, &a->gamma, -1, 0.125, NULL, "G",
        "steps grow to distance * G, 0 = not at all; -1: 1/128 where the bound is above 1, else 0\t#\t-"},
       {"--stop", 0, SF_ARG_DOUBLE, &c->stop, SF_STOP_MIN, SF_STOP_MAX, NULL, "X",
